@@ -1,0 +1,46 @@
+# One way in: `make run` does the main job, `make test` checks everything. Each makes .venv first, if needed.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+OUT    ?= out
+
+.DEFAULT_GOAL := help
+.PHONY: help run test lint bench samples clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+
+run: $(VENV)/.ready ## set up if needed, then calibrate sample_logs/ into out/
+	@$(BIN)/sccal calibrate sample_logs --out $(OUT)
+
+test: $(VENV)/.ready-dev lint ## set up if needed, then lint, type-check and test
+	$(BIN)/python -m pytest -n auto
+
+lint: $(VENV)/.ready-dev ## ruff (style and format) and mypy
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.ready-dev ## time the filter, the readers and the whole command
+	$(BIN)/python -m benchmarks
+
+samples: $(VENV)/.ready ## make sample_logs/ anew (seeded: the same bytes every time)
+	$(BIN)/sccal simulate --samples sample_logs
+
+clean: ## remove the environment, caches and results
+	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis dist build
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# uv is only a faster installer; where it cannot be had, pip does the same.
+$(VENV)/.ready: pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv 2>/dev/null \
+	  && $(BIN)/uv pip install --quiet --python $(BIN)/python -e . \
+	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.ready-dev: $(VENV)/.ready pyproject.toml
+	@$(BIN)/uv pip install --quiet --python $(BIN)/python --group dev 2>/dev/null \
+	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1" \
+	  && $(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
+	@touch $@

@@ -1,0 +1,24 @@
+"""sccal: calibrated wheel radii, track width and heading offset from a field robot's own logs.
+
+Conventions, valid everywhere in this package
+---------------------------------------------
+* Plane: east-north of a local tangent frame (never UTM, whose scale of 0.9996 is a 0.04 % radius error and whose
+  convergence is a heading error). Heading θ is counter-clockwise from east.
+* Robot frame: forward, left. The robot's position is the middle between the two wheels (or tracks).
+* Units: SI and radians inside; degrees only in files, command-line text and reports. A name carries its unit
+  (``track_m``, ``t_s``, ``yaw_rad``); textbook letters appear only where a docstring's equation uses them.
+* Time: seconds on the logging computer's clock.
+* Innovation: ν = z − h(x), measured minus predicted.
+* Heading offset: what the AHRS reads, turned into enu, minus the robot's heading.
+
+Rooms, ground floor first; imports point down only
+--------------------------------------------------
+errors · geodesy · logs (bytes to streams) · align (streams to one timeline of events) · filter (the compiled kernel,
+the forward filter, the noise) · calibration (one run, several runs, outages) · simulate · report (text, json, yaml,
+figures, html; computes nothing) · cli (parse, call, print, exit code)
+
+The model is that of L. Cantelli, S. Ligama, G. Muscato, D. Spina, "Auto-Calibration Methods of Kinematic Parameters
+and Magnetometer Offset for the Localization of a Tracked Mobile Robot", Robotics 2016, 5(4), 23.
+"""
+
+__version__ = "0.1.0"

@@ -1,0 +1,236 @@
+"""What a calibration found, with everything that a report needs: reports compute nothing.
+
+Angles are in radians here and become degrees only where they are written or printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.streams import Notice, Vehicle
+
+Status = Literal["estimated", "unobserved", "at_bound", "held"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: its value, its standard deviation (both in the parameter's unit), and whether to believe it."""
+
+    value: float
+    sigma: float
+    status: Status
+    reason: str = ""
+    """Why it should not be believed and what to do about it; empty where it should."""
+    nominal: float | None = None
+    """The declared prior value; None where there is none (the heading offset)."""
+    prior_sigma: float | None = None
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The calibrated constants of the paper's state: R_r, R_l, L and Ofs."""
+
+    radius_right_m: Estimate
+    radius_left_m: Estimate
+    track_m: Estimate
+    heading_offset_rad: Estimate
+    """What the AHRS reads, turned into enu, minus the robot's heading; in (−π, π]."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Levels and correlation times of the measurement errors that the filter used, and where they come from.
+
+    An error is white plus a first-order Gauss-Markov part (standard deviation ``coloured``, correlation time ``tau``).
+    """
+
+    heading_white_rad: float
+    heading_coloured_rad: float
+    heading_tau_s: float
+    fix_scale: float
+    """Factor on the stated (or table) sigma of the fixes that makes their white part consistent with the log."""
+    fix_coloured_m: float
+    fix_tau_s: float
+    slip_m_per_sqrt_m: float
+    """Random travel error of each wheel: standard deviation after one metre, growing with the root of distance."""
+    source: Literal["estimated", "given"] = "estimated"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How well the filter's predictions met the measurements (innovations of the accepted ones)."""
+
+    gnss_innovation_rms_m: float
+    """Root mean square of the innovation's length (east and north together)."""
+    heading_innovation_rms_rad: float
+    nis_gnss: float
+    """Mean normalised innovation squared per degree of freedom; 1 is consistent."""
+    nis_heading: float
+    fixes_used: int
+    fixes_rejected: int
+    headings_used: int
+    headings_rejected: int
+    recoveries: int
+    """How often the filter had locked itself out and was opened again."""
+
+
+@dataclass(frozen=True)
+class OutageWindow:
+    """One stretch with the fixes withheld, judged antenna against antenna."""
+
+    start_s: float
+    end_s: float
+    distance_m: float
+    rms_drift_m: float
+    end_drift_m: float
+    t_s: Floats
+    """Times of the withheld fixes."""
+    drift_m: Floats
+    """Distance between the predicted and the withheld fix at those times."""
+
+
+@dataclass(frozen=True)
+class Outage:
+    """Drift over windows without fixes, dead-reckoned by what the filter had learnt before each window."""
+
+    window_s: float
+    windows: tuple[OutageWindow, ...]
+    rms_m: float | None
+    """Over all withheld fixes; None where no window fits into the run."""
+    end_rms_m: float | None
+    percent_of_distance: float | None
+    """Sum of the end drifts over the sum of the distances driven in the windows, in percent."""
+    how: str
+    """Which data taught the filter and which judged it, in words."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The middle between the wheels, in the tangent plane."""
+
+    t_s: Floats
+    east_m: Floats
+    north_m: Floats
+    yaw_rad: Floats
+    sigma_east_m: Floats
+    sigma_north_m: Floats
+    sigma_yaw_rad: Floats
+
+
+@dataclass(frozen=True)
+class History:
+    """The parameters as the forward filter learnt them, starting from the nominal values (m, m, m, rad)."""
+
+    t_s: Floats
+    radius_right_m: Floats
+    radius_left_m: Floats
+    track_m: Floats
+    heading_offset_rad: Floats
+    sigma_radius_right_m: Floats
+    sigma_radius_left_m: Floats
+    sigma_track_m: Floats
+    sigma_heading_offset_rad: Floats
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Innovations ν = z − h(x) at every measurement of the last pass."""
+
+    heading_t_s: Floats
+    heading_rad: Floats
+    heading_sigma_rad: Floats
+    heading_accepted: Bools
+    fix_t_s: Floats
+    fix_east_m: Floats
+    fix_north_m: Floats
+    fix_sigma_east_m: Floats
+    fix_sigma_north_m: Floats
+    fix_accepted: Bools
+
+
+@dataclass(frozen=True)
+class Fixes:
+    """The fixes as they were used, in the tangent plane and on the logging computer's clock."""
+
+    t_s: Floats
+    east_m: Floats
+    north_m: Floats
+    quality: Ints
+    """As in GGA; -1 where not given."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What the run did: the part of a verdict that a driver can change."""
+
+    duration_s: float
+    distance_m: float
+    reversed_m: float
+    """Part of the distance driven backwards."""
+    standing_s: float
+    max_speed_mps: float
+    turned_left_rad: float
+    """Sum of the turning to the left (counter-clockwise)."""
+    turned_right_rad: float
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How the fixes' times were put on the logging computer's clock."""
+
+    source: Literal["host", "utc", "utc_mapped"]
+    """host: receive times as logged (gnss.csv); utc: the logging clock is Unix time; utc_mapped: the receiver's epochs
+    mapped onto the logging clock by a line through the receive times."""
+    offset_s: float
+    """Logging clock minus UTC in the middle of the run (0 where source is host)."""
+    skew_ppm: float
+    jitter_s: float
+    """Robust spread of the receive times around the mapping."""
+    knots: int
+    """Corners of the mapping; 2 is a straight line, more mean that the logging clock was being steered."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One run, calibrated."""
+
+    run: str
+    vehicle: Vehicle
+    with_offset: bool
+    """False for the paper's SC EKF without the offset state."""
+    parameters: Parameters
+    origin_lat_deg: float
+    origin_lon_deg: float
+    fit: Fit
+    outage: Outage
+    noise: Noise
+    drive: Drive
+    clock: Clock
+    trajectory: Trajectory
+    history: History
+    residuals: Residuals
+    fixes: Fixes
+    notices: tuple[Notice, ...]
+    """Everything that readers, alignment and filter had to repair, drop or doubt."""
+    effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class VehicleCalibration:
+    """Several runs of one vehicle as one problem: shared radii and track, own poses and offsets."""
+
+    vehicle: Vehicle
+    with_offset: bool
+    runs: tuple[Calibration, ...]
+    parameters: Parameters
+    fit: Fit
+    """Pooled over the runs."""
+    outage: Outage
+    """All runs' windows together."""
+    consistency_chi2_per_dof: float | None
+    """Disagreement of the runs about the shared parameters, over what their sigmas allow; None for one run."""
+    notices: tuple[Notice, ...] = ()
+    effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)

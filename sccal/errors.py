@@ -1,0 +1,43 @@
+"""What can go wrong, in one place: every known failure is one line for the user and one exit code.
+
+A bug is anything that is not an SccalError; it keeps its traceback and exits with 4.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Exit(IntEnum):
+    """Exit codes of the command line; part of the contract with CI jobs."""
+
+    FINE = 0
+    GATE_FAILED = 1
+    USAGE = 2
+    DATA = 3
+    INTERNAL = 4
+    NOTHING_MATCHED = 5
+
+
+class SccalError(Exception):
+    """A failure that the user can act on. The message is one line: what, where, the numbers, what to do."""
+
+    exit_code: Exit = Exit.INTERNAL
+
+
+class UsageError(SccalError):
+    """The command line asks for something that cannot be done."""
+
+    exit_code = Exit.USAGE
+
+
+class DataError(SccalError):
+    """The data cannot support the answer: unreadable, missing, contradictory, or not excited."""
+
+    exit_code = Exit.DATA
+
+
+class NothingMatchedError(SccalError):
+    """A pattern or filter selected nothing."""
+
+    exit_code = Exit.NOTHING_MATCHED

@@ -1,0 +1,114 @@
+"""The streams of one run, as arrays: what every reader gives and the alignment takes.
+
+Every array of a stream has the same length n and is sorted by its own time, strictly increasing. Further numeric
+columns of a file ride along in ``extras`` (name to float array of length n, NaN where a cell is empty).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from sccal.arrays import Bools, Floats, Ints
+
+Convention = Literal["enu", "ned"]
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something that a reader met and dealt with, counted: "12 rows could not be read, first at line 40"."""
+
+    source: str
+    """Which file, as the user would name it (``encoder.csv``)."""
+    what: str
+    """What was met and what was done about it, in words after the count ("rows with text cells dropped")."""
+    count: int
+    where: str = ""
+    """Place of the first one: ``line 40`` or ``t = 12.3 s``."""
+    severity: Literal["info", "warning"] = "info"
+
+    def __str__(self) -> str:
+        place = f" (first at {self.where})" if self.where else ""
+        return f"{self.source}: {self.count} {self.what}{place}"
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """What ``vehicle.toml`` declares. Nominal values are the prior, not the answer."""
+
+    name: str
+    path: Path
+    wheel_radius_m: float
+    track_m: float
+    ticks_per_rev: float | None = None
+    """Counts per turn of the wheel, after gearing; None where the encoder file holds angles."""
+    counter_bits: int | None = None
+    convention: Convention = "enu"
+    """Of the AHRS yaw: enu, counter-clockwise from east; ned, clockwise from north."""
+
+
+@dataclass(frozen=True)
+class WheelStream:
+    """Cumulative angles of the two wheels, forward positive, counters unwrapped and repaired."""
+
+    t_s: Floats
+    left_rad: Floats
+    right_rad: Floats
+    loose: Bools
+    """True where the travel since the previous sample is not known well: a counter reset, or a gap."""
+    extras: Mapping[str, Floats] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class HeadingStream:
+    """The AHRS reading in the file's own convention (see Vehicle.convention), in radians, not unwrapped."""
+
+    t_s: Floats
+    yaw_rad: Floats
+    yaw_sigma_rad: Floats | None = None
+    pitch_rad: Floats | None = None
+    """Nose up positive."""
+    roll_rad: Floats | None = None
+    """Left side up positive."""
+    gyro_z_radps: Floats | None = None
+    extras: Mapping[str, Floats] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class FixStream:
+    """Position fixes with both of their clocks: which one to trust is for the alignment to decide."""
+
+    host_t_s: Floats
+    """Time on the logging computer's clock (receive time); NaN where the log has none."""
+    utc_s: Floats
+    """The receiver's epoch as Unix time; NaN where the log has none (gnss.csv)."""
+    utc_has_date: bool
+    """False where the log gave times of day only: utc_s then counts from an arbitrary midnight."""
+    lat_deg: Floats
+    lon_deg: Floats
+    alt_m: Floats
+    """Height above the ellipsoid where known, else above sea level, else NaN."""
+    quality: Ints
+    """As in GGA: 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float; -1 where not given."""
+    sigma_east_m: Floats
+    """Stated by the log (GST, sigma_m); NaN where not stated."""
+    sigma_north_m: Floats
+    cov_en_m2: Floats
+    """East-north covariance stated by the log; 0 where not stated."""
+    extras: Mapping[str, Floats] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, read and repaired but not yet aligned."""
+
+    name: str
+    """Unique within one call; names the folder of its results. May hold '/'."""
+    path: Path
+    vehicle: Vehicle
+    wheels: WheelStream
+    heading: HeadingStream
+    fixes: FixStream
+    notices: tuple[Notice, ...] = ()
