@@ -41,6 +41,6 @@ $(VENV)/.ready: pyproject.toml
 
 $(VENV)/.ready-dev: $(VENV)/.ready pyproject.toml
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --group dev 2>/dev/null \
-	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1" \
-	  && $(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev
+	  || { $(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1" \
+	  && $(BIN)/python -m pip install --quiet --disable-pip-version-check --group dev; }
 	@touch $@

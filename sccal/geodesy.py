@@ -32,9 +32,10 @@ class TangentPlane:
     def _transformer(self) -> Transformer:
         from pyproj import Transformer
 
+        lat, lon, alt = float(self.lat_deg), float(self.lon_deg), float(self.alt_m)
         return Transformer.from_pipeline(
             "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step +proj=cart +ellps=WGS84 "
-            f"+step +proj=topocentric +ellps=WGS84 +lat_0={self.lat_deg!r} +lon_0={self.lon_deg!r} +h_0={self.alt_m!r}"
+            f"+step +proj=topocentric +ellps=WGS84 +lat_0={lat!r} +lon_0={lon!r} +h_0={alt!r}"
         )
 
     def to_east_north(self, lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:

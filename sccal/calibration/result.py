@@ -9,8 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from sccal.align.clocks import Clock
 from sccal.arrays import Bools, Floats, Ints
+from sccal.filter.forward import Noise
 from sccal.logs.streams import Notice, Vehicle
+
+__all__ = ["Calibration", "Clock", "Drive", "Estimate", "Fit", "Fixes", "History", "Noise", "Outage", "OutageWindow", "Parameters", "Residuals", "Status", "Trajectory", "VehicleCalibration"]
 
 Status = Literal["estimated", "unobserved", "at_bound", "held"]
 
@@ -38,25 +42,6 @@ class Parameters:
     track_m: Estimate
     heading_offset_rad: Estimate
     """What the AHRS reads, turned into enu, minus the robot's heading; in (−π, π]."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Levels and correlation times of the measurement errors that the filter used, and where they come from.
-
-    An error is white plus a first-order Gauss-Markov part (standard deviation ``coloured``, correlation time ``tau``).
-    """
-
-    heading_white_rad: float
-    heading_coloured_rad: float
-    heading_tau_s: float
-    fix_scale: float
-    """Factor on the stated (or table) sigma of the fixes that makes their white part consistent with the log."""
-    fix_coloured_m: float
-    fix_tau_s: float
-    slip_m_per_sqrt_m: float
-    """Random travel error of each wheel: standard deviation after one metre, growing with the root of distance."""
-    source: Literal["estimated", "given"] = "estimated"
 
 
 @dataclass(frozen=True)
@@ -175,22 +160,6 @@ class Drive:
     turned_left_rad: float
     """Sum of the turning to the left (counter-clockwise)."""
     turned_right_rad: float
-
-
-@dataclass(frozen=True)
-class Clock:
-    """How the fixes' times were put on the logging computer's clock."""
-
-    source: Literal["host", "utc", "utc_mapped"]
-    """host: receive times as logged (gnss.csv); utc: the logging clock is Unix time; utc_mapped: the receiver's epochs
-    mapped onto the logging clock by a line through the receive times."""
-    offset_s: float
-    """Logging clock minus UTC in the middle of the run (0 where source is host)."""
-    skew_ppm: float
-    jitter_s: float
-    """Robust spread of the receive times around the mapping."""
-    knots: int
-    """Corners of the mapping; 2 is a straight line, more mean that the logging clock was being steered."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,5 @@
+"""``python -m sccal``."""
+
+from sccal.cli import main
+
+main()

@@ -1,0 +1,161 @@
+"""One run with all its streams on the logging clock, in the tangent plane, and turned counter-clockwise from east."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sccal.align.accuracy import (
+    QUALITY_NAMES,
+    SIMULATOR_QUALITY,
+    fix_covariance,
+    table_sigma_m,
+    usable,
+)
+from sccal.align.clocks import Clock, fixes_on_host_clock, require_overlap
+from sccal.align.signs import check_signs
+from sccal.arrays import Bools, Floats, Ints
+from sccal.errors import DataError
+from sccal.geodesy import TangentPlane
+from sccal.logs.streams import Convention, Notice, Run, Vehicle
+
+MIN_MEASUREMENTS = 10
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """One run, ready to be filtered. Times are on the logging clock and lie within the wheels' span."""
+
+    name: str
+    vehicle: Vehicle
+    plane: TangentPlane
+    clock: Clock
+    wheel_t_s: Floats
+    right_rad: Floats
+    """Cumulative angle of the right wheel (n,), from 0."""
+    left_rad: Floats
+    loose: Bools
+    heading_t_s: Floats
+    yaw_rad: Floats
+    """AHRS reading turned into enu (h,), unwrapped."""
+    yaw_sigma_rad: Floats | None
+    fix_t_s: Floats
+    fix_east_m: Floats
+    fix_north_m: Floats
+    fix_quality: Ints
+    fix_var_east_m2: Floats
+    fix_var_north_m2: Floats
+    fix_cov_m2: Floats
+    fix_leading: Bools
+    """Fixes of the quality that carries most of the information: the ones that outages are judged by."""
+    notices: tuple[Notice, ...]
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """First and last time of the wheels."""
+        return float(self.wheel_t_s[0]), float(self.wheel_t_s[-1])
+
+    @property
+    def travel_m(self) -> Floats:
+        """Signed distance of the middle between the wheels (n,), with the nominal radius."""
+        return self.vehicle.wheel_radius_m * 0.5 * (self.right_rad + self.left_rad)
+
+
+def yaw_to_enu(yaw_rad: Floats, convention: Convention) -> Floats:
+    """A yaw in the file's convention, counter-clockwise from east (same shape, not wrapped)."""
+    return yaw_rad if convention == "enu" else 0.5 * np.pi - yaw_rad
+
+
+def align(run: Run) -> Aligned:
+    """Bring the streams of one run together.
+
+    Raises DataError where clocks, amounts of data or signs make a calibration impossible.
+    """
+    notices = list(run.notices)
+    wheels, heading, fixes = run.wheels, run.heading, run.fixes
+    span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
+
+    t_s, timed, clock = fixes_on_host_clock(fixes, span)
+    if not timed.any():
+        raise DataError("gnss: no fix has a usable time")
+    require_overlap(t_s[timed], span, clock, "the fixes")
+    require_overlap(heading.t_s, span, Clock("host", 0, 0, 0, 2), "ahrs.csv")
+
+    good = timed & usable(fixes.quality)
+    for code in np.unique(fixes.quality[timed & ~good]):
+        count = int((fixes.quality[timed & ~good] == code).sum())
+        name = QUALITY_NAMES.get(int(code), "unknown")
+        notices.append(Notice("gnss", f"fixes of quality {code} ({name}) not used", count))
+    simulated = int((fixes.quality[good] == SIMULATOR_QUALITY).sum())
+    if simulated:
+        notices.append(Notice("gnss", "fixes say they come from a simulator (quality 8)", simulated, "", "warning"))
+    good &= _inside(t_s, span, "gnss", notices)
+    order = np.argsort(t_s[good], kind="stable")
+    good_index = np.flatnonzero(good)[order]
+    fresh = np.concatenate(([True], np.diff(t_s[good_index]) > 0)) if good_index.size else np.zeros(0, bool)
+    good_index = good_index[fresh]
+    if good_index.size < MIN_MEASUREMENTS:
+        raise DataError(
+            f"gnss: {good_index.size} usable fixes within the wheels' span of {span[1] - span[0]:.1f} s, "
+            f"at least {MIN_MEASUREMENTS} are needed: log longer, or check the receiver's fix quality"
+        )
+
+    seen = _inside(heading.t_s, span, "ahrs.csv", notices)
+    if int(seen.sum()) < MIN_MEASUREMENTS:
+        raise DataError(
+            f"ahrs.csv: {int(seen.sum())} readings within the wheels' span of {span[1] - span[0]:.1f} s, "
+            f"at least {MIN_MEASUREMENTS} are needed"
+        )
+
+    lat, lon = fixes.lat_deg[good_index], fixes.lon_deg[good_index]
+    quality = fixes.quality[good_index]
+    alt = fixes.alt_m[good_index]
+    height = float(np.median(alt[np.isfinite(alt)])) if np.isfinite(alt).any() else 0.0
+    best = table_sigma_m(quality) <= table_sigma_m(quality).min()
+    plane = TangentPlane(float(lat[best][0]), float(lon[best][0]), round(height, 2))
+    east, north = plane.to_east_north(lat, lon)
+    var_east, var_north, cov = fix_covariance(
+        quality, fixes.sigma_east_m[good_index], fixes.sigma_north_m[good_index], fixes.cov_en_m2[good_index]
+    )
+
+    aligned = Aligned(
+        name=run.name,
+        vehicle=run.vehicle,
+        plane=plane,
+        clock=clock,
+        wheel_t_s=wheels.t_s,
+        right_rad=wheels.right_rad - wheels.right_rad[0],
+        left_rad=wheels.left_rad - wheels.left_rad[0],
+        loose=wheels.loose,
+        heading_t_s=heading.t_s[seen],
+        yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], run.vehicle.convention)),
+        yaw_sigma_rad=None if heading.yaw_sigma_rad is None else heading.yaw_sigma_rad[seen],
+        fix_t_s=t_s[good_index],
+        fix_east_m=east,
+        fix_north_m=north,
+        fix_quality=quality,
+        fix_var_east_m2=var_east,
+        fix_var_north_m2=var_north,
+        fix_cov_m2=cov,
+        fix_leading=_leading(quality, var_east + var_north),
+        notices=tuple(notices),
+    )
+    check_signs(aligned)
+    return aligned
+
+
+def _inside(t_s: Floats, span: tuple[float, float], source: str, notices: list[Notice]) -> Bools:
+    """Which times lie within the wheels' span; the others are counted."""
+    inside = np.asarray((t_s >= span[0]) & (t_s <= span[1]))
+    outside = int((np.isfinite(t_s) & ~inside).sum())
+    if outside:
+        notices.append(Notice(source, "measurements before the first or after the last encoder sample not used", outside))
+    return inside
+
+
+def _leading(quality: Ints, variance_m2: Floats) -> Bools:
+    """Fixes of the quality with the largest sum of 1/σ²."""
+    codes = np.unique(quality)
+    information = [float((1.0 / variance_m2[quality == code]).sum()) for code in codes]
+    return np.asarray(quality == codes[int(np.argmax(information))])

@@ -1,0 +1,86 @@
+"""The wheels' motion without the part that is only slip: what the constants' sensitivities are computed from.
+
+A robot held on its path by a controller moves smoothly; its wheels turn a little more here and less there, because
+they slip. A filter that takes every such wiggle of the wheels for a turn sees turns that the robot never made, concludes
+that turns by the wheels mean little, and grows a track that is too wide, with a sigma that is too small: the classical
+attenuation by errors in the regressor. On a straight line it would "measure" the track out of slip alone.
+
+Prediction keeps the raw wheel angles. Only the derivatives by R_r, R_l and L use the motion that stands out of the
+noise: sum and difference of the wheels' travel, thresholded in Haar wavelets averaged over shifts (Donoho and Johnstone
+1994; Coifman and Donoho 1995), the noise level per root of distance taken from the finest scale.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sccal.arrays import Floats
+
+GRID_S = 0.1
+SHIFTS = 8
+THRESHOLD_SIGMAS = 4.0
+NORMAL_MAD = 1.4826
+
+
+def denoised_angles(
+    wheel_t_s: Floats, right_rad: Floats, left_rad: Floats, right_over_left: float
+) -> tuple[Floats, Floats, Floats]:
+    """A uniform time grid (g,) and the cumulative right and left angles on it, freed of noise.
+
+    right_over_left is R_r/R_l as far as known: with it, straight driving has no turn at any speed.
+    """
+    count = max(int(np.ceil((wheel_t_s[-1] - wheel_t_s[0]) / GRID_S)), 2)
+    grid = np.linspace(wheel_t_s[0], wheel_t_s[-1], count + 1)
+    right = np.diff(np.interp(grid, wheel_t_s, right_rad)) * right_over_left
+    left = np.diff(np.interp(grid, wheel_t_s, left_rad))
+    travelled = np.abs(right) + np.abs(left)
+    both = _denoise(right + left, travelled)
+    difference = _denoise(right - left, travelled)
+    zero = np.zeros(1)
+    return (
+        grid,
+        np.concatenate((zero, np.cumsum(0.5 * (both + difference)))) / right_over_left,
+        np.concatenate((zero, np.cumsum(0.5 * (both - difference)))),
+    )
+
+
+def _denoise(steps: Floats, travelled: Floats) -> Floats:
+    """Steps (g,) with their noise, of variance proportional to the distance travelled, thresholded away."""
+    scaled = np.diff(steps)[::2]
+    base = (travelled[:-1] + travelled[1:])[: scaled.size * 2 : 2]
+    moving = base > 0
+    if moving.sum() < 8:
+        return steps
+    level = NORMAL_MAD * float(np.median(np.abs(scaled[moving]) / np.sqrt(base[moving])))
+    variance = level**2 * travelled
+    size = 1 << int(np.ceil(np.log2(steps.size)))
+    padded = np.zeros(size)
+    padded_variance = np.zeros(size)
+    total = np.zeros(steps.size)
+    shifts = [(k * size) // SHIFTS + k for k in range(SHIFTS)]
+    for shift in shifts:
+        padded[: steps.size], padded[steps.size :] = steps, 0.0
+        padded_variance[: steps.size], padded_variance[steps.size :] = variance, 0.0
+        kept = _haar_threshold(np.roll(padded, shift), np.roll(padded_variance, shift))
+        total += np.roll(kept, -shift)[: steps.size]
+    return total / len(shifts)
+
+
+def _haar_threshold(values: Floats, variance: Floats) -> Floats:
+    """Hard threshold of the orthonormal Haar coefficients of values (2^k,), given their noise variance (2^k,)."""
+    details: list[Floats] = []
+    smooth, smooth_variance = values, variance
+    while smooth.size > 1:
+        detail = (smooth[::2] - smooth[1::2]) / np.sqrt(2.0)
+        smooth = (smooth[::2] + smooth[1::2]) / np.sqrt(2.0)
+        smooth_variance = 0.5 * (smooth_variance[::2] + smooth_variance[1::2])
+        detail[np.abs(detail) < THRESHOLD_SIGMAS * np.sqrt(smooth_variance)] = 0.0
+        details.append(detail)
+    if smooth[0] ** 2 < THRESHOLD_SIGMAS**2 * smooth_variance[0]:
+        smooth = np.zeros(1)
+    for detail in reversed(details):
+        finer = np.empty(2 * smooth.size)
+        finer[::2] = (smooth + detail) / np.sqrt(2.0)
+        finer[1::2] = (smooth - detail) / np.sqrt(2.0)
+        smooth = finer
+    return smooth

@@ -1,0 +1,123 @@
+"""One timeline of events: every encoder sample, every measurement and every output, in order of time.
+
+The *cumulative* wheel angle is interpolated to each event's own time, so the state is predicted exactly to it. Using
+the last encoder sample instead leaves the state up to one sample stale, which looks like a latency of the heading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sccal.align.aligned import Aligned
+from sccal.align.denoise import denoised_angles
+from sccal.arrays import Floats
+
+LOOSE_FRACTION = 0.25
+LOOSE_FLOOR_M = 0.02
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """n events; rows point into the aligned measurements (-1: none here)."""
+
+    t_s: Floats
+    right_rad: Floats
+    """Wheel angle since the event before (n,); 0 at the first."""
+    left_rad: Floats
+    loose_m2: Floats
+    """Extra variance of each wheel's travel since the event before (n,): gaps and counter resets."""
+    heading_row: np.ndarray
+    """(n,) int32 into Timeline.heading_index."""
+    fix_row: np.ndarray
+    out_row: np.ndarray
+    heading_index: np.ndarray
+    """(h,) int64: which of the aligned readings are used."""
+    fix_index: np.ndarray
+    out_t_s: Floats
+
+
+def thin(t_s: Floats, rate_hz: float) -> np.ndarray:
+    """Indices of the readings that keep at most the given rate (every k-th where the stream is regular)."""
+    if t_s.size < 2 or not np.isfinite(rate_hz):
+        return np.arange(t_s.size)
+    step = float(np.median(np.diff(t_s)))
+    every = max(1, int(np.floor(1.0 / (rate_hz * max(step, 1e-9)) + 0.5)))
+    return np.arange(0, t_s.size, every)
+
+
+def build_timeline(
+    aligned: Aligned,
+    output_rate_hz: float = 10.0,
+    heading_rate_hz: float = 10.0,
+    fix_rate_hz: float = 10.0,
+    between_s: tuple[float, float] | None = None,
+    wheel_rate_hz: float = np.inf,
+) -> Timeline:
+    """Events of the run, or of the part of it between two times.
+
+    Readings of the AHRS come faster than its error changes; the ones beyond heading_rate_hz would only pretend to be
+    independent. wheel_rate_hz thins the pure prediction events, for passes that need no fine path.
+    """
+    first, last = aligned.span_s
+    if between_s is not None:
+        first, last = max(first, between_s[0]), min(last, between_s[1])
+
+    heading_index = _within(aligned.heading_t_s, first, last, thin(aligned.heading_t_s, heading_rate_hz))
+    fix_index = _within(aligned.fix_t_s, first, last, thin(aligned.fix_t_s, fix_rate_hz))
+    wheel_index = _within(aligned.wheel_t_s, first, last, thin(aligned.wheel_t_s, wheel_rate_hz))
+    heading_t, fix_t = aligned.heading_t_s[heading_index], aligned.fix_t_s[fix_index]
+    out_t = np.arange(np.ceil(first * output_rate_hz), np.floor(last * output_rate_hz) + 1) / output_rate_hz
+    out_t = out_t[(out_t >= first) & (out_t <= last)]
+
+    t_s = np.unique(np.concatenate(([first, last], aligned.wheel_t_s[wheel_index], heading_t, fix_t, out_t)))
+    return Timeline(
+        t_s=t_s,
+        right_rad=_steps(t_s, aligned.wheel_t_s, aligned.right_rad),
+        left_rad=_steps(t_s, aligned.wheel_t_s, aligned.left_rad),
+        loose_m2=_steps(t_s, aligned.wheel_t_s, np.cumsum(_loose_variance(aligned))),
+        heading_row=_rows(t_s, heading_t),
+        fix_row=_rows(t_s, fix_t),
+        out_row=_rows(t_s, out_t),
+        heading_index=heading_index,
+        fix_index=fix_index,
+        out_t_s=out_t,
+    )
+
+
+def clear_steps(aligned: Aligned, timeline: Timeline, right_over_left: float) -> tuple[Floats, Floats]:
+    """Right and left wheel angle from event to event (n,), without what is only slip (see denoise)."""
+    grid, right, left = denoised_angles(aligned.wheel_t_s, aligned.right_rad, aligned.left_rad, right_over_left)
+    return _steps(timeline.t_s, grid, right), _steps(timeline.t_s, grid, left)
+
+
+def _within(t_s: Floats, first: float, last: float, index: np.ndarray) -> np.ndarray:
+    return index[(t_s[index] >= first) & (t_s[index] <= last)]
+
+
+def _steps(t_s: Floats, sample_t_s: Floats, cumulative: Floats) -> Floats:
+    """Change of a cumulative quantity from event to event (n,), 0 at the first."""
+    at = np.interp(t_s, sample_t_s, cumulative)
+    steps = np.empty_like(at)
+    steps[0] = 0.0
+    np.subtract(at[1:], at[:-1], out=steps[1:])
+    return steps
+
+
+def _rows(t_s: Floats, some_t_s: Floats) -> np.ndarray:
+    """For every event the row of the measurement that stands at its time, or -1."""
+    rows = np.full(t_s.size, -1, dtype=np.int32)
+    rows[np.searchsorted(t_s, some_t_s)] = np.arange(some_t_s.size, dtype=np.int32)
+    return rows
+
+
+def _loose_variance(aligned: Aligned) -> Floats:
+    """Variance (m²) of each wheel's travel since the sample before, where that travel is not well known."""
+    variance = np.zeros(aligned.wheel_t_s.size)
+    index = np.flatnonzero(aligned.loose)
+    index = index[index > 0]
+    for angle in (aligned.right_rad, aligned.left_rad):
+        travel = np.abs(angle[index] - angle[index - 1]) * aligned.vehicle.wheel_radius_m
+        variance[index] = np.maximum(variance[index], (LOOSE_FRACTION * travel + LOOSE_FLOOR_M) ** 2)
+    return variance

@@ -1,0 +1,202 @@
+"""Several runs of one vehicle as one problem: shared radii and track, own poses, own heading offsets.
+
+Each run's pass leaves the posterior of (R_r, R_l, L) with its own pose and offset marginalised; prior taken out, that
+is the run's likelihood: precision Λ_i and vector η_i. Runs are independent given the shared constants, so the joint
+posterior is Λ = Λ_0 + Σ Λ_i, η = Λ_0 m_0 + Σ η_i, the prior counted once. All runs are linearised again at the joint
+answer until it stays.
+
+Where runs disagree by more than their sigmas allow, something that the model lacks differs between them. The sigmas
+then come from the runs' own scores u_i = η_i − Λ_i m (Liang and Zeger 1986, runs as clusters), if those are larger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sccal.arrays import Floats
+from sccal.calibration.outage import summarise
+from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
+from sccal.calibration.status import judge
+from sccal.filter.forward import bounds, prior_sigmas
+from sccal.filter.iterate import RunProblem
+from sccal.filter.start import Constants
+from sccal.logs.streams import Notice
+
+MAX_ROUNDS = 4
+CLOSE_SIGMAS = 0.05
+INCONSISTENT = 3.0
+OFFSET_OF_THE_RUN_RAD = np.radians(5.0)
+
+
+@dataclass(frozen=True)
+class RunLikelihood:
+    """What one run says of R_r, R_l, L, its own pose and offset marginalised, no prior in it."""
+
+    precision: Floats
+    """(3, 3)"""
+    vector: Floats
+    """(3,) precision times the run's own best values."""
+
+    @classmethod
+    def of(cls, problem: RunProblem, at: Constants) -> RunLikelihood:
+        """From a pass linearised at the given constants."""
+        found = problem.begun(at, linear_at=at).finish()
+        posterior = np.linalg.inv(found.final_covariance[3:6, 3:6])
+        prior = _prior_precision(problem)
+        precision = posterior - prior
+        vector = posterior @ found.final_state[3:6] - prior @ at.as_array()
+        return cls(0.5 * (precision + precision.T), vector)
+
+
+def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> VehicleCalibration:
+    """One result for all runs of a vehicle; runs and problems belong together, one or more."""
+    first = problems[0]
+    vehicle, options = first.aligned.vehicle, first.options
+    if len(runs) == 1:
+        only = runs[0]
+        return VehicleCalibration(
+            vehicle, only.with_offset, (only,), only.parameters, only.fit, only.outage, None, effects=only.effects
+        )
+    prior = _prior_precision(first)
+    nominal = Constants.nominal(vehicle).as_array()
+    lower, upper = bounds(vehicle, options)
+    at = _rough_mean(runs)
+    for _ in range(MAX_ROUNDS):
+        shared = Constants(*(float(v) for v in at))
+        likelihoods = [RunLikelihood.of(problem, shared) for problem in problems]
+        precision = prior + sum(one.precision for one in likelihoods)
+        covariance = np.linalg.inv(precision)
+        mode = np.clip(covariance @ (prior @ nominal + sum(one.vector for one in likelihoods)), lower, upper)
+        moved = np.abs(mode - at) / np.sqrt(np.diag(covariance))
+        at = mode
+        if moved.max() < CLOSE_SIGMAS:
+            break
+    chi2_per_dof = _consistency(likelihoods, at, prior)
+    covariance = _at_least(covariance, _between_runs(likelihoods, at, covariance))
+    offset, notices = _combined_offset(runs)
+    full = np.zeros((4, 4))
+    full[:3, :3] = covariance
+    full[3, 3] = offset.sigma**2
+    parameters = judge(np.append(at, offset.value), full, vehicle, options, _pooled_drive(runs))
+    if chi2_per_dof is not None and chi2_per_dof > INCONSISTENT:
+        what = (
+            f"runs disagree about radii and track by {np.sqrt(chi2_per_dof):.1f} times what their sigmas allow; the "
+            "vehicle's sigmas are widened to their scatter, and something that the model lacks differs between runs"
+        )
+        notices.append(Notice("vehicle", what, len(runs), "", "warning"))
+    return VehicleCalibration(
+        vehicle=vehicle,
+        with_offset=runs[0].with_offset,
+        runs=tuple(runs),
+        parameters=Parameters(parameters.radius_right_m, parameters.radius_left_m, parameters.track_m, offset),
+        fit=_pooled_fit([run.fit for run in runs]),
+        outage=summarise(
+            [window for run in runs for window in run.outage.windows],
+            runs[0].outage.window_s,
+            runs[0].outage.how.split(" from ")[0] + " in every run; each judged by what its own run had learnt before it",
+        ),
+        consistency_chi2_per_dof=chi2_per_dof,
+        notices=tuple(notices),
+    )
+
+
+def _prior_precision(problem: RunProblem) -> Floats:
+    return np.diag(1.0 / prior_sigmas(problem.aligned.vehicle, problem.options) ** 2)
+
+
+def _rough_mean(runs: Sequence[Calibration]) -> Floats:
+    """Median over the runs: good enough to linearise at."""
+    values = [
+        [run.parameters.radius_right_m.value, run.parameters.radius_left_m.value, run.parameters.track_m.value]
+        for run in runs
+    ]
+    return np.asarray(np.median(values, axis=0))
+
+
+def _consistency(likelihoods: Sequence[RunLikelihood], at: Floats, prior: Floats) -> float | None:
+    """χ² of the runs' own answers around the joint one, per degree of freedom, over the directions they observe."""
+    chi2, directions = 0.0, 0
+    scale = np.sqrt(np.diag(prior))
+    for one in likelihoods:
+        score = (one.vector - one.precision @ at) / scale
+        values, vectors = np.linalg.eigh(one.precision / np.outer(scale, scale))
+        seen = values > 1.0
+        chi2 += float(((vectors.T @ score)[seen] ** 2 / values[seen]).sum())
+        directions += int(seen.sum())
+    dof = directions - at.size
+    return chi2 / dof if dof > 0 else None
+
+
+def _between_runs(likelihoods: Sequence[RunLikelihood], at: Floats, covariance: Floats) -> Floats:
+    """Covariance from the scatter of the runs' scores."""
+    scores = np.array([one.vector - one.precision @ at for one in likelihoods])
+    count = len(likelihoods)
+    return np.asarray(covariance @ (scores.T @ scores) @ covariance * (count / (count - 1.0)))
+
+
+def _at_least(covariance: Floats, other: Floats) -> Floats:
+    """The covariance with every sigma raised to the other's where that is larger, correlations kept."""
+    sigma = np.sqrt(np.diag(covariance))
+    raised = np.maximum(sigma, np.sqrt(np.maximum(np.diag(other), 0.0))) / sigma
+    return np.asarray(covariance * np.outer(raised, raised))
+
+
+def _combined_offset(runs: Sequence[Calibration]) -> tuple[Estimate, list[Notice]]:
+    """The heading offset belongs to each run; their mean is the mounting's where they agree."""
+    offsets = [run.parameters.heading_offset_rad for run in runs]
+    if not runs[0].with_offset:
+        return offsets[0], []
+    values = np.array([one.value for one in offsets])
+    sigmas = np.array([one.sigma for one in offsets])
+    middle = float(np.angle(np.exp(1j * values).sum()))
+    apart = np.angle(np.exp(1j * (values - middle)))
+    # Random effects: the runs' own scatter beyond their sigmas is part of what one offset for all cannot know.
+    between2 = max(float(apart.var(ddof=1)) - float((sigmas**2).mean()), 0.0)
+    weight = 1.0 / (sigmas**2 + between2)
+    mean = middle + float((weight * apart).sum() / weight.sum())
+    value = float(np.pi - (np.pi - mean) % (2.0 * np.pi))
+    sigma = float(1.0 / np.sqrt(weight.sum()))
+    spread = float(np.ptp(apart))
+    if spread > OFFSET_OF_THE_RUN_RAD:
+        reason = (
+            f"the heading offset differs by up to {np.degrees(spread):.0f}° between the runs: it belongs to each run (an "
+            "AHRS whose zero is set at power-up?), see the runs' own values"
+        )
+        return Estimate(value, max(sigma, spread), "unobserved", reason), [Notice("vehicle", reason, 1, "", "warning")]
+    return Estimate(value, sigma, "estimated"), []
+
+
+def _pooled_drive(runs: Sequence[Calibration]) -> Drive:
+    drives = [run.drive for run in runs]
+    return Drive(
+        duration_s=sum(d.duration_s for d in drives),
+        distance_m=sum(d.distance_m for d in drives),
+        reversed_m=sum(d.reversed_m for d in drives),
+        standing_s=sum(d.standing_s for d in drives),
+        max_speed_mps=max(d.max_speed_mps for d in drives),
+        turned_left_rad=sum(d.turned_left_rad for d in drives),
+        turned_right_rad=sum(d.turned_right_rad for d in drives),
+    )
+
+
+def _pooled_fit(fits: Sequence[Fit]) -> Fit:
+    """Means weighted by the number of measurements."""
+
+    def mean(values: list[float], weights: list[int]) -> float:
+        return float(np.average(values, weights=np.maximum(weights, 1)))
+
+    used, heads = [f.fixes_used for f in fits], [f.headings_used for f in fits]
+    return Fit(
+        gnss_innovation_rms_m=float(np.sqrt(mean([f.gnss_innovation_rms_m**2 for f in fits], used))),
+        heading_innovation_rms_rad=float(np.sqrt(mean([f.heading_innovation_rms_rad**2 for f in fits], heads))),
+        nis_gnss=mean([f.nis_gnss for f in fits], used),
+        nis_heading=mean([f.nis_heading for f in fits], heads),
+        fixes_used=sum(used),
+        fixes_rejected=sum(f.fixes_rejected for f in fits),
+        headings_used=sum(heads),
+        headings_rejected=sum(f.headings_rejected for f in fits),
+        recoveries=sum(f.recoveries for f in fits),
+    )

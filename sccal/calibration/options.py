@@ -1,0 +1,21 @@
+"""What a user may choose about a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from sccal.filter.forward import Noise
+from sccal.filter.options import FilterOptions
+
+
+@dataclass(frozen=True)
+class CalibrationOptions:
+    """Options of one calibration; the filter's own are inside."""
+
+    filter: FilterOptions = field(default_factory=FilterOptions)
+    outage_window_s: float = 30.0
+    output_rate_hz: float = 10.0
+    heading_rate_hz: float = 10.0
+    """Readings beyond this rate are left out: an AHRS's error changes more slowly."""
+    noise: Noise | None = None
+    """None: estimated from the log."""

@@ -1,0 +1,194 @@
+"""One run: start, noise, the honest forward pass, and the pass linearised at its own answer.
+
+The filter runs forward from the nominal constants first. That pass is what a robot would have learnt on the way: it
+gives the history of the parameters and the outage figures. The constants themselves come from the iterated passes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sccal.align import Aligned, align, build_timeline
+from sccal.arrays import Floats
+from sccal.calibration.options import CalibrationOptions
+from sccal.calibration.outage import run_with_outages
+from sccal.calibration.result import (
+    Calibration,
+    Drive,
+    Fit,
+    Fixes,
+    History,
+    Residuals,
+    Trajectory,
+)
+from sccal.calibration.status import judge
+from sccal.filter.forward import ForwardPass
+from sccal.filter.iterate import RunProblem, iterate
+from sccal.filter.noise import estimate_noise
+from sccal.filter.start import ODD_SCALE, Constants, find_start, first_constants
+from sccal.logs.streams import Notice, Run
+
+SETTLED_S = 20.0
+STANDING_MPS = 0.02
+
+
+def prepare(run: Run, options: CalibrationOptions) -> RunProblem:
+    """Align one run and find its start and noise. Raises DataError where that is impossible."""
+    aligned = align(run)
+    start = find_start(aligned)
+    noise = options.noise
+    if noise is None:
+        noise = estimate_noise(aligned, start, options.filter, options.heading_rate_hz)
+    timeline = build_timeline(aligned, options.output_rate_hz, options.heading_rate_hz)
+    return RunProblem(aligned, timeline, start, noise, options.filter)
+
+
+def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, RunProblem]:
+    """Calibrate one run. Raises DataError where the data cannot support it."""
+    problem = prepare(run, options)
+    aligned, start = problem.aligned, problem.start
+
+    forward = problem.begun(first_constants(aligned, start))
+    outage = run_with_outages(forward, aligned, start, options.outage_window_s)
+    honest = forward.finish()
+
+    values, final = iterate(problem, Constants.of(honest.final_state))
+    covariance = final.final_covariance[3:7, 3:7]
+    drive = describe_drive(aligned, float(values[:2].mean()))
+    return (
+        Calibration(
+            run=run.name,
+            vehicle=aligned.vehicle,
+            with_offset=options.filter.with_offset,
+            parameters=judge(values, covariance, aligned.vehicle, options.filter, drive),
+            origin_lat_deg=aligned.plane.lat_deg,
+            origin_lon_deg=aligned.plane.lon_deg,
+            fit=measure_fit(problem, final),
+            outage=outage,
+            noise=problem.noise,
+            drive=drive,
+            clock=aligned.clock,
+            trajectory=_trajectory(final),
+            history=_history(honest),
+            residuals=_residuals(problem, final),
+            fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
+            notices=(*aligned.notices, *_doubts(problem, final)),
+        ),
+        problem,
+    )
+
+
+def measure_fit(problem: RunProblem, found: ForwardPass) -> Fit:
+    """Innovation figures of one pass, from SETTLED_S after the first motion on."""
+    timeline, aligned = problem.timeline, problem.aligned
+    settled = problem.start.moving_from_s + SETTLED_S
+    heading = found.heading_accepted & (aligned.heading_t_s[timeline.heading_index] >= settled)
+    fix = found.fix_accepted & (aligned.fix_t_s[timeline.fix_index] >= settled)
+    if not heading.any():
+        heading = found.heading_accepted
+    if not fix.any():
+        fix = found.fix_accepted
+    return fit_of(
+        found.heading_nu_rad[heading],
+        found.heading_var_rad2[heading],
+        found.fix_nu_m[fix],
+        found.fix_var_m2[fix],
+        fixes_used=int(found.fix_accepted.sum()),
+        fixes_rejected=int((~found.fix_accepted).sum()),
+        headings_used=int(found.heading_accepted.sum()),
+        headings_rejected=int((~found.heading_accepted).sum()),
+        recoveries=found.recoveries,
+    )
+
+
+def fit_of(heading_nu: Floats, heading_var: Floats, fix_nu: Floats, fix_var: Floats, **counts: int) -> Fit:
+    """Root mean squares and normalised innovations squared of accepted measurements."""
+    see, snn, sen = fix_var[:, 0], fix_var[:, 1], fix_var[:, 2]
+    e, n = fix_nu[:, 0], fix_nu[:, 1]
+    nis_fix = (snn * e**2 - 2.0 * sen * e * n + see * n**2) / (see * snn - sen**2)
+    return Fit(
+        gnss_innovation_rms_m=_rms(np.hypot(e, n)),
+        heading_innovation_rms_rad=_rms(heading_nu),
+        nis_gnss=float(nis_fix.mean() / 2.0) if nis_fix.size else float("nan"),
+        nis_heading=float((heading_nu**2 / heading_var).mean()) if heading_nu.size else float("nan"),
+        **counts,
+    )
+
+
+def describe_drive(aligned: Aligned, radius_m: float) -> Drive:
+    """What the run did, by its wheels and AHRS."""
+    steps = 0.5 * radius_m * (np.diff(aligned.right_rad) + np.diff(aligned.left_rad))
+    seconds = np.arange(aligned.span_s[0], aligned.span_s[1], 0.5)
+    travel = np.interp(seconds, aligned.wheel_t_s, np.concatenate(([0.0], np.cumsum(steps))))
+    speed = np.diff(travel) / 0.5
+    turn = np.diff(np.interp(seconds, aligned.heading_t_s, aligned.yaw_rad))
+    # Small turns are the AHRS's noise as much as the robot's motion; the wheels must agree that it turns.
+    by_wheels = np.diff(np.interp(seconds, aligned.wheel_t_s, aligned.right_rad - aligned.left_rad))
+    by_wheels *= radius_m / aligned.vehicle.track_m
+    turning = np.abs(by_wheels) > np.radians(1.0)
+    wheels_stand = np.abs(by_wheels) < 1e-6
+    return Drive(
+        duration_s=aligned.span_s[1] - aligned.span_s[0],
+        distance_m=float(np.abs(steps).sum()),
+        reversed_m=float(-steps[steps < 0].sum()),
+        standing_s=float(0.5 * ((np.abs(speed) < STANDING_MPS) & wheels_stand).sum()),
+        max_speed_mps=float(np.abs(speed).max()) if speed.size else 0.0,
+        turned_left_rad=float(turn[turning & (turn > 0)].sum()),
+        turned_right_rad=float(-turn[turning & (turn < 0)].sum()),
+    )
+
+
+def _doubts(problem: RunProblem, found: ForwardPass) -> list[Notice]:
+    """What the filter itself noticed."""
+    notices = []
+    rejected = int((~found.fix_accepted).sum())
+    if rejected:
+        severity = "warning" if rejected > 0.05 * found.fix_accepted.size else "info"
+        notices.append(Notice("filter", "fixes rejected as outliers", rejected, "", severity))  # type: ignore[arg-type]
+    rejected = int((~found.heading_accepted).sum())
+    if rejected:
+        severity = "warning" if rejected > 0.05 * found.heading_accepted.size else "info"
+        notices.append(Notice("filter", "heading readings rejected as outliers", rejected, "", severity))  # type: ignore[arg-type]
+    if found.recoveries:
+        what = "times the measurements left the prediction for good, and the filter was opened up again"
+        notices.append(Notice("filter", what, found.recoveries, "", "warning"))
+    scale = problem.start.wheel_scale
+    if abs(scale - 1.0) > ODD_SCALE:
+        what = (
+            f"sign that ticks_per_rev or wheel_radius_m in vehicle.toml is wrong: at the start the fixes move {scale:.2f} "
+            "times as far as the wheels"
+        )
+        notices.append(Notice("vehicle.toml", what, 1, "", "warning"))
+    return notices
+
+
+def _trajectory(found: ForwardPass) -> Trajectory:
+    state, sigma = found.state, found.sigma
+    return Trajectory(
+        found.timeline.out_t_s, state[:, 0], state[:, 1], state[:, 2], sigma[:, 0], sigma[:, 1], sigma[:, 2]
+    )
+
+
+def _history(found: ForwardPass) -> History:
+    state, sigma = found.state, found.sigma
+    return History(found.timeline.out_t_s, *(state[:, k] for k in range(3, 7)), *(sigma[:, k] for k in range(3, 7)))
+
+
+def _residuals(problem: RunProblem, found: ForwardPass) -> Residuals:
+    timeline, aligned = problem.timeline, problem.aligned
+    return Residuals(
+        heading_t_s=aligned.heading_t_s[timeline.heading_index],
+        heading_rad=found.heading_nu_rad,
+        heading_sigma_rad=np.sqrt(found.heading_var_rad2),
+        heading_accepted=found.heading_accepted,
+        fix_t_s=aligned.fix_t_s[timeline.fix_index],
+        fix_east_m=found.fix_nu_m[:, 0],
+        fix_north_m=found.fix_nu_m[:, 1],
+        fix_sigma_east_m=np.sqrt(found.fix_var_m2[:, 0]),
+        fix_sigma_north_m=np.sqrt(found.fix_var_m2[:, 1]),
+        fix_accepted=found.fix_accepted,
+    )
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")

@@ -1,0 +1,65 @@
+"""Whether to believe a parameter, and if not, why and what to drive."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sccal.arrays import Floats
+from sccal.calibration.result import Drive, Estimate, Parameters
+from sccal.filter.forward import bounds, prior_sigmas
+from sccal.filter.options import FilterOptions
+from sccal.logs.streams import Vehicle
+
+UNOBSERVED_RATIO = 0.5
+"""A parameter whose sigma is still more than this share of its prior's was not moved off the prior by the data."""
+BOUND_SIGMAS = 1.0
+OFFSET_UNOBSERVED_RAD = np.radians(10.0)
+
+
+def judge(
+    values: Floats,
+    covariance: Floats,
+    vehicle: Vehicle,
+    options: FilterOptions,
+    drive: Drive,
+) -> Parameters:
+    """Parameters from R_r, R_l, L, Ofs (4,) and their covariance (4, 4)."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    prior = prior_sigmas(vehicle, options)
+    nominal = np.array([vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m])
+    lower, upper = bounds(vehicle, options)
+    names = ("right radius", "left radius", "track")
+    found: list[Estimate] = []
+    for k in range(3):
+        status, reason = "estimated", ""
+        value = float(values[k])
+        if sigma[k] > UNOBSERVED_RATIO * prior[k]:
+            status = "unobserved"
+            reason = _why_unobserved(names[k], drive)
+        elif value <= lower[k] + BOUND_SIGMAS * sigma[k] or value >= upper[k] - BOUND_SIGMAS * sigma[k]:
+            status = "at_bound"
+            edge = lower[k] if value < nominal[k] else upper[k]
+            reason = (
+                f"the {names[k]} ran to its bound of {edge:.4g} m: check ticks_per_rev, wheel_radius_m and track_m in "
+                "vehicle.toml"
+            )
+        found.append(Estimate(value, float(sigma[k]), status, reason, float(nominal[k]), float(prior[k])))  # type: ignore[arg-type]
+    return Parameters(found[0], found[1], found[2], _judge_offset(float(values[3]), float(sigma[3]), options))
+
+
+def _judge_offset(value: float, sigma: float, options: FilterOptions) -> Estimate:
+    wrapped = float(np.pi - (np.pi - value) % (2.0 * np.pi))
+    if not options.with_offset:
+        return Estimate(0.0, 0.0, "held", "held at zero: the filter without the offset state was asked for")
+    if sigma > OFFSET_UNOBSERVED_RAD:
+        reason = f"the heading offset is known to {np.degrees(sigma):.0f}° only: drive further in a straight line"
+        return Estimate(wrapped, sigma, "unobserved", reason, None, options.offset_prior_rad)
+    return Estimate(wrapped, sigma, "estimated", "", None, options.offset_prior_rad)
+
+
+def _why_unobserved(name: str, drive: Drive) -> str:
+    turned = np.degrees(drive.turned_left_rad + drive.turned_right_rad)
+    did = f"this run drove {drive.distance_m:.0f} m and turned {turned:.0f}° in all"
+    if name == "track":
+        return f"the track cannot be seen in this run ({did}): spin in place both ways, or drive arcs to both sides"
+    return f"the {name} cannot be told from the other constants in this run ({did}): drive straight and turn both ways"

@@ -1,0 +1,275 @@
+"""The forward filter over one aligned run: events, initial state and numbers put into the kernel's form."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sccal.align import Aligned, Timeline
+from sccal.arrays import Bools, Floats
+from sccal.filter import kernel
+from sccal.filter.compiled import is_compiled
+from sccal.filter.kernel import BASE_STATES, Columns, Events, Model, Output
+from sccal.filter.options import FilterOptions
+from sccal.filter.start import Constants, Start
+from sccal.logs.streams import Vehicle
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Levels and correlation times of the measurement errors that the filter uses, and where they come from.
+
+    An error is white plus a first-order Gauss-Markov part (standard deviation ``coloured``, correlation time ``tau``).
+    """
+
+    heading_white_rad: float
+    heading_coloured_rad: float
+    heading_tau_s: float
+    fix_scale: float
+    """Factor on the stated (or table) sigma of the fixes of the leading quality: their white part in this log."""
+    fix_coloured_m: float
+    fix_tau_s: float
+    slip_m_per_sqrt_m: float
+    """Random travel error of each wheel: standard deviation after one metre, growing with the root of distance."""
+    source: str = "estimated"
+    """estimated or given."""
+    other_fix_scale: Mapping[int, float] = field(default_factory=dict)
+    """The same factor for fixes of another quality (GGA code to factor)."""
+
+
+@dataclass(frozen=True)
+class ForwardPass:
+    """What one pass left: the reported states at the output times, and every innovation."""
+
+    timeline: Timeline
+    state: Floats
+    """(m, 7) x, y, θ, R_r, R_l, L, Ofs at Timeline.out_t_s."""
+    sigma: Floats
+    """(m, 7) standard deviations of the same."""
+    final_state: Floats
+    """(n,) the kernel's whole state after the last event."""
+    final_covariance: Floats
+    """(n, n)"""
+    heading_nu_rad: Floats
+    heading_var_rad2: Floats
+    heading_accepted: Bools
+    fix_nu_m: Floats
+    """(f, 2) east, north."""
+    fix_var_m2: Floats
+    """(f, 3) S_ee, S_nn, S_en."""
+    fix_accepted: Bools
+    recoveries: int
+    nll_heading: float
+    nll_fix: float
+
+
+def say_if_compiling() -> None:
+    """One line on standard error before the only slow first call."""
+    if not is_compiled():
+        print("compiling the filter (once, a few seconds) …", file=sys.stderr, flush=True)
+
+
+class Filter:
+    """The kernel bound to one run's events: start it, run it in parts, fork it."""
+
+    def __init__(
+        self,
+        aligned: Aligned,
+        timeline: Timeline,
+        noise: Noise,
+        options: FilterOptions,
+        clear: tuple[Floats, Floats],
+        linear_at: Constants | None = None,
+        columns: Columns | None = None,
+        effects: int = 0,
+    ) -> None:
+        self.timeline = timeline
+        self.options = options
+        self.states = BASE_STATES + effects
+        self.events = make_events(aligned, timeline, noise, clear)
+        self.columns = no_columns(self.events) if columns is None else columns
+        self.model = make_model(aligned.vehicle, options, noise, self.states, linear_at)
+        self.output = self.make_output(with_states=True)
+        self.x = np.zeros(self.states)
+        self.P = np.zeros((self.states, self.states))
+        self.memory = np.zeros(kernel.MEMORY_SIZE)
+        self.position = 0
+
+    def make_output(self, with_states: bool) -> Output:
+        """Room for what a pass leaves."""
+        h, f = self.events.yaw_rad.size, self.events.fix_east_m.size
+        m = self.timeline.out_t_s.size if with_states else 0
+        nan = np.full
+        return Output(
+            state=np.zeros((m, kernel.REPORTED_STATES)),
+            sigma=np.zeros((m, kernel.REPORTED_STATES)),
+            heading_nu=nan(h, np.nan),
+            heading_var=nan(h, np.nan),
+            heading_ok=np.zeros(h, dtype=np.bool_),
+            fix_nu=nan((f, 2), np.nan),
+            fix_var=nan((f, 3), np.nan),
+            fix_ok=np.zeros(f, dtype=np.bool_),
+            antenna=nan((f, 2), np.nan),
+            total=np.zeros(2),
+        )
+
+    def begin(self, start: Start, constants: Constants, vehicle: Vehicle, priors: Floats | None = None) -> None:
+        """Set state and covariance at the first event; priors are standard deviations of R_r, R_l, L."""
+        options = self.options
+        sigma = prior_sigmas(vehicle, options) if priors is None else priors
+        offset = start.offset_rad if options.with_offset else 0.0
+        self.x[:] = 0.0
+        self.x[:3] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
+        self.x[3:6] = constants.as_array()
+        self.x[6] = offset
+        variance = np.zeros(self.states)
+        variance[:2] = start.sigma_position_m**2
+        variance[2] = start.sigma_yaw_rad**2
+        variance[3:6] = sigma**2
+        variance[6] = options.offset_prior_rad**2 if options.with_offset else 0.0
+        variance[7] = self.model.heading_coloured_var
+        variance[8:10] = self.model.fix_coloured_var
+        self.P[:] = np.diag(variance)
+        self.memory[:] = 0.0
+        self.memory[: kernel.MEM_FIX_T + 1] = self.events.t_s[0]
+        self.output.total[:] = 0.0
+        self.position = 0
+
+    def run_to(self, last: int | None = None) -> None:
+        """Run on to (not including) event ``last``; to the end if None."""
+        last = self.events.t_s.size if last is None else last
+        kernel.forward(
+            self.events, self.columns, self.model, self.x, self.P, self.memory, self.position, last, True, self.output
+        )
+        self.position = last
+
+    def outage_to(self, last: int, scratch: Output) -> None:
+        """From here to event ``last`` as if there were no fixes, on copies: this filter stays where it is.
+
+        Fills scratch.antenna with the predicted antenna at the withheld fixes.
+        """
+        kernel.forward(
+            self.events,
+            self.columns,
+            self.model,
+            self.x.copy(),
+            self.P.copy(),
+            self.memory.copy(),
+            self.position,
+            last,
+            False,
+            scratch,
+        )
+
+    def finish(self) -> ForwardPass:
+        """Run to the end and hand over what was found."""
+        self.run_to()
+        out = self.output
+        return ForwardPass(
+            timeline=self.timeline,
+            state=out.state,
+            sigma=out.sigma,
+            final_state=self.x.copy(),
+            final_covariance=self.P.copy(),
+            heading_nu_rad=out.heading_nu,
+            heading_var_rad2=out.heading_var,
+            heading_accepted=out.heading_ok,
+            fix_nu_m=out.fix_nu,
+            fix_var_m2=out.fix_var,
+            fix_accepted=out.fix_ok,
+            recoveries=int(self.memory[kernel.MEM_RECOVERIES]),
+            nll_heading=float(out.total[0]),
+            nll_fix=float(out.total[1]),
+        )
+
+
+def prior_sigmas(vehicle: Vehicle, options: FilterOptions) -> Floats:
+    """Prior standard deviations of R_r, R_l, L (m)."""
+    radius = options.radius_prior * vehicle.wheel_radius_m
+    return np.array([radius, radius, options.track_prior * vehicle.track_m])
+
+
+def bounds(vehicle: Vehicle, options: FilterOptions) -> tuple[Floats, Floats]:
+    """Lower and upper physical bounds of R_r, R_l, L (m)."""
+    scale = np.array([vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m])
+    factors = np.array([options.radius_bounds, options.radius_bounds, options.track_bounds])
+    return scale * factors[:, 0], scale * factors[:, 1]
+
+
+def make_model(
+    vehicle: Vehicle, options: FilterOptions, noise: Noise, states: int, linear_at: Constants | None = None
+) -> Model:
+    """The kernel's numbers; without ``linear_at``, derivatives are taken at the running estimate."""
+    from scipy.special import erfc
+
+    walk = np.zeros(states)
+    walk[3:5] = (options.radius_walk * vehicle.wheel_radius_m) ** 2
+    walk[5] = (options.track_walk * vehicle.track_m) ** 2
+    walk[6] = options.offset_walk_rad**2 if options.with_offset else 0.0
+    lower, upper = bounds(vehicle, options)
+    outside = float(erfc(options.gate_sigmas / np.sqrt(2.0)))
+    return Model(
+        slip2=noise.slip_m_per_sqrt_m**2,
+        heading_coloured_var=noise.heading_coloured_rad**2 if options.with_offset else 0.0,
+        heading_tau_s=noise.heading_tau_s,
+        fix_coloured_var=noise.fix_coloured_m**2,
+        fix_tau_s=noise.fix_tau_s,
+        walk=walk,
+        linear=np.zeros(3) if linear_at is None else linear_at.as_array(),
+        lower=lower,
+        upper=upper,
+        heading_gate=options.gate_sigmas**2,
+        fix_gate=-2.0 * float(np.log(outside)),
+        recover_count=float(options.recover_count),
+        recover_s=options.recover_s,
+        use_offset=options.with_offset,
+    )
+
+
+def make_events(aligned: Aligned, timeline: Timeline, noise: Noise, clear: tuple[Floats, Floats]) -> Events:
+    """The kernel's arrays, with the noise's white levels put in; clear as from sccal.align.clear_steps."""
+    heading, fix = timeline.heading_index, timeline.fix_index
+    if aligned.yaw_sigma_rad is None:
+        yaw_var = np.full(heading.size, noise.heading_white_rad**2)
+    else:
+        relative = aligned.yaw_sigma_rad[heading] / np.median(aligned.yaw_sigma_rad)
+        yaw_var = (noise.heading_white_rad * np.clip(relative, 0.1, 100.0)) ** 2
+    scale2 = np.full(fix.size, noise.fix_scale**2)
+    for code, factor in noise.other_fix_scale.items():
+        scale2[aligned.fix_quality[fix] == code] = factor**2
+    return Events(
+        t_s=timeline.t_s,
+        right_rad=timeline.right_rad,
+        left_rad=timeline.left_rad,
+        right_clear_rad=clear[0],
+        left_clear_rad=clear[1],
+        loose_m2=timeline.loose_m2,
+        heading_row=timeline.heading_row,
+        fix_row=timeline.fix_row,
+        out_row=timeline.out_row,
+        yaw_rad=aligned.yaw_rad[heading],
+        yaw_var_rad2=yaw_var,
+        fix_east_m=aligned.fix_east_m[fix],
+        fix_north_m=aligned.fix_north_m[fix],
+        fix_var_east_m2=aligned.fix_var_east_m2[fix] * scale2,
+        fix_var_north_m2=aligned.fix_var_north_m2[fix] * scale2,
+        fix_cov_m2=aligned.fix_cov_m2[fix] * scale2,
+    )
+
+
+def no_columns(events: Events) -> Columns:
+    """The model without effects."""
+    none = np.zeros(0, dtype=np.int32)
+    return Columns(
+        motion=np.zeros((events.t_s.size, 0)),
+        motion_port=none,
+        motion_param=none,
+        heading=np.zeros((events.yaw_rad.size, 0)),
+        heading_param=none,
+        fix=np.zeros((events.fix_east_m.size, 0)),
+        fix_port=none,
+        fix_param=none,
+    )

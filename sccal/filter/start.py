@@ -1,0 +1,178 @@
+"""Where the robot stands and heads at the beginning, from the data.
+
+The wheels' signed travel laid out along the AHRS yaw is the path up to a turn, a scale and a shift; the fixes show the
+path itself. In complex numbers, fixes z = α p + c: the angle of α is minus the heading offset, its length the scale of
+the wheels. Signed travel makes a start in reverse as good as any other. The window grows from the first motion until
+the angle is sure, so the zero of the AHRS may be anything and the robot may stand first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sccal.align import Aligned
+from sccal.align.signs import slope_through_origin
+from sccal.arrays import Floats
+from sccal.errors import DataError
+from sccal.logs.streams import Vehicle
+
+FIRST_WINDOW_S = 10.0
+GROWTH = 1.6
+ENOUGH_RAD = np.radians(1.0)
+MIN_SPREAD_M = 1.0
+CORRELATION_S = 3.0
+HEADING_FLOOR_RAD = np.radians(3.0)
+HUBER = 1.5
+ODD_SCALE = 0.15
+"""Beyond this the wheels' declared scale, not their wear, is wrong."""
+
+
+@dataclass(frozen=True)
+class Constants:
+    """Values of the vehicle's constants that a pass starts from."""
+
+    radius_right_m: float
+    radius_left_m: float
+    track_m: float
+
+    @classmethod
+    def nominal(cls, vehicle: Vehicle) -> Constants:
+        return cls(vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m)
+
+    @classmethod
+    def of(cls, state: Floats) -> Constants:
+        """From a kernel state (n,)."""
+        return cls(float(state[3]), float(state[4]), float(state[5]))
+
+    def as_array(self) -> Floats:
+        return np.array([self.radius_right_m, self.radius_left_m, self.track_m])
+
+
+@dataclass(frozen=True)
+class Start:
+    """Pose at the first event, heading offset, and how sure they are."""
+
+    east_m: float
+    north_m: float
+    yaw_rad: float
+    offset_rad: float
+    sigma_position_m: float
+    sigma_yaw_rad: float
+    wheel_scale: float
+    """Travel by the fixes over travel by the wheels with the nominal radius."""
+    moving_from_s: float
+    until_s: float
+    """End of the stretch that this rests on; nothing later was used."""
+
+
+def find_start(aligned: Aligned) -> Start:
+    """The start of one run. Raises DataError where the robot hardly moves."""
+    travel = aligned.travel_m
+    turned_m = 0.5 * aligned.vehicle.wheel_radius_m * (aligned.right_rad - aligned.left_rad)
+    path = path_along_yaw(aligned)
+    fixes = aligned.fix_east_m + 1j * aligned.fix_north_m
+    path_at_fixes = np.interp(aligned.fix_t_s, aligned.wheel_t_s, path)
+    sigma = np.sqrt(aligned.fix_var_east_m2 + aligned.fix_var_north_m2)
+
+    moved = np.abs(travel - travel[0]) + np.abs(turned_m - turned_m[0])
+    begins = np.flatnonzero(moved > 0.05)
+    moving_from = float(aligned.wheel_t_s[begins[0]]) if begins.size else aligned.span_s[1]
+    first, last = aligned.span_s
+    length = FIRST_WINDOW_S
+    fit = None
+    while True:
+        until = moving_from + length
+        rows = np.flatnonzero((aligned.fix_t_s <= until) & (aligned.fix_t_s >= moving_from - FIRST_WINDOW_S))
+        if rows.size >= 5:
+            fit = _similarity(path_at_fixes[rows], fixes[rows], sigma[rows], aligned.fix_t_s[rows])
+            if fit.sigma_angle < ENOUGH_RAD and fit.spread_m > MIN_SPREAD_M:
+                break
+        if until >= last:
+            break
+        length *= GROWTH
+    if fit is None or fit.spread_m < 0.3 or fit.sigma_angle > 0.7:
+        total = float(np.abs(np.diff(travel)).sum())
+        raise DataError(
+            f"the robot hardly moves: the wheels turn for {total:.2f} m in {last - first:.0f} s, and the fixes do not show "
+            "in which direction; drive at least 10 m"
+        )
+    offset = -float(np.angle(fit.alpha))
+    yaw_first = float(np.interp(first, aligned.heading_t_s, aligned.yaw_rad))
+    position = fit.alpha * (path[0] - fit.path_mean) + fit.fix_mean
+    return Start(
+        east_m=float(position.real),
+        north_m=float(position.imag),
+        yaw_rad=yaw_first - offset,
+        offset_rad=float(np.arctan2(np.sin(offset), np.cos(offset))),
+        sigma_position_m=float(3.0 * fit.rms_m + np.median(sigma) + 0.1),
+        sigma_yaw_rad=float(
+            np.sqrt(HEADING_FLOOR_RAD**2 + (2 * fit.sigma_angle) ** 2 + min(fit.rms_m / fit.spread_m, 1.0) ** 2)
+        ),
+        wheel_scale=float(np.abs(fit.alpha)),
+        moving_from_s=moving_from,
+        until_s=min(until, last),
+    )
+
+
+def path_along_yaw(aligned: Aligned) -> np.ndarray:
+    """The wheels' signed travel laid out along the AHRS yaw, (n,) complex metres from 0, at the wheels' times."""
+    yaw = np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad)
+    middle = 0.5 * (yaw[1:] + yaw[:-1])
+    return np.concatenate(([0.0], np.cumsum(np.diff(aligned.travel_m) * np.exp(1j * middle))))
+
+
+def first_constants(aligned: Aligned, start: Start) -> Constants:
+    """Nominal values, unless the start already shows that the wheels' scale is far off."""
+    vehicle = aligned.vehicle
+    if abs(start.wheel_scale - 1.0) <= ODD_SCALE:
+        return Constants.nominal(vehicle)
+    radius = vehicle.wheel_radius_m * float(np.clip(start.wheel_scale, 0.5, 2.0))
+    return Constants(radius, radius, vehicle.track_m)
+
+
+def coarse_constants(aligned: Aligned, start: Start) -> Constants:
+    """Radii and track near enough to linearise at: the start's scale, and the AHRS's turning over the wheels'."""
+    vehicle = aligned.vehicle
+    scale = float(np.clip(start.wheel_scale, 0.5, 2.0))
+    t_s = np.arange(max(aligned.span_s[0], aligned.heading_t_s[0]), min(aligned.span_s[1], aligned.heading_t_s[-1]))
+    wheels = np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.right_rad - aligned.left_rad))
+    wheels *= scale * vehicle.wheel_radius_m / vehicle.track_m
+    yaw = np.diff(np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad))
+    turning = slope_through_origin(wheels, yaw)
+    narrower = turning.value if turning.clear and np.abs(wheels).sum() > np.pi else 1.0
+    radius = scale * vehicle.wheel_radius_m
+    return Constants(radius, radius, vehicle.track_m / float(np.clip(narrower, 0.4, 2.5)))
+
+
+@dataclass(frozen=True)
+class _Similarity:
+    alpha: complex
+    path_mean: complex
+    fix_mean: complex
+    rms_m: float
+    spread_m: float
+    sigma_angle: float
+
+
+def _similarity(path: Floats, fixes: Floats, sigma_m: Floats, t_s: Floats) -> _Similarity:
+    """z = α (p − p̄) + z̄ by reweighted least squares, and how sure the angle of α is."""
+    base = 1.0 / sigma_m**2
+    weight = base.copy()
+    for _ in range(5):
+        total = weight.sum()
+        path_mean = complex((weight * path).sum() / total)
+        fix_mean = complex((weight * fixes).sum() / total)
+        p = path - path_mean
+        z = fixes - fix_mean
+        power = float((weight * np.abs(p) ** 2).sum())
+        alpha = complex((weight * np.conj(p) * z).sum() / power) if power > 0 else 1.0 + 0.0j
+        residual = np.abs(z - alpha * p)
+        scale = max(float(np.median(residual / sigma_m)), 1e-3)
+        weight = base / np.maximum(residual / (HUBER * scale * sigma_m), 1.0)
+    rms = float(np.sqrt((weight * residual**2).sum() / total))
+    spread = float(np.sqrt((weight * np.abs(p) ** 2).sum() / total))
+    independent = max(2.0, min(path.size / 2.0, float(np.ptp(t_s)) / CORRELATION_S))
+    noise = max(rms, float(np.sqrt(1.0 / base.mean())))
+    return _Similarity(alpha, path_mean, fix_mean, rms, spread, noise / (max(spread, 1e-6) * np.sqrt(independent)))

@@ -1,0 +1,62 @@
+"""``ahrs.csv``: the AHRS readings in the file's own convention, in radians."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sccal.arrays import Floats
+from sccal.logs.streams import HeadingStream, Notice
+from sccal.logs.table import read_table
+
+_YAW = ("yaw_deg", "yaw_rad")
+_FURTHER = {
+    "pitch": ("pitch_deg", "pitch_rad"),
+    "roll": ("roll_deg", "roll_rad"),
+    "yaw_sigma": ("yaw_sigma_deg", "yaw_sigma_rad"),
+    "gyro_z": ("gyro_z_dps", "gyro_z_radps"),
+}
+_DEGREE_LIKE_RAD = 50.0
+
+
+def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
+    """Read an AHRS file: ``t`` and ``yaw_deg`` or ``yaw_rad``; where both are there, degrees are read.
+
+    Raises:
+        DataError: unreadable file or missing columns.
+    """
+    table = read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad")))
+    notices = list(table.notices)
+    yaw_rad = _radians(table.columns, *_YAW)
+    assert yaw_rad is not None
+    if "yaw_deg" not in table.columns:
+        odd = np.abs(table.columns["yaw_rad"]) > _DEGREE_LIKE_RAD
+        if odd.any():
+            what = f"yaw_rad values beyond {_DEGREE_LIKE_RAD:.0f} look like degrees; if so, name the column yaw_deg"
+            notices.append(Notice(table.source, what, int(odd.sum()), f"line {table.line[odd][0]}", "warning"))
+    further = {name: _radians(table.columns, *pair) for name, pair in _FURTHER.items()}
+    sigma_rad = further["yaw_sigma"]
+    if sigma_rad is not None:
+        unusable = sigma_rad <= 0
+        if unusable.any():
+            sigma_rad = np.where(unusable, np.nan, sigma_rad)
+            what = "yaw sigmas of zero or less taken as not stated"
+            notices.append(Notice(table.source, what, int(unusable.sum()), f"line {table.line[unusable][0]}"))
+    used = ["t", *_YAW, *(name for pair in _FURTHER.values() for name in pair)]
+    stream = HeadingStream(
+        t_s=table.columns["t"],
+        yaw_rad=yaw_rad,
+        yaw_sigma_rad=sigma_rad,
+        pitch_rad=further["pitch"],
+        roll_rad=further["roll"],
+        gyro_z_radps=further["gyro_z"],
+        extras=table.extras(used),
+    )
+    return stream, tuple(notices)
+
+
+def _radians(columns: dict[str, Floats], in_degrees: str, in_radians: str) -> Floats | None:
+    if in_degrees in columns:
+        return np.radians(columns[in_degrees])
+    return columns.get(in_radians)

@@ -1,0 +1,61 @@
+"""``gnss.csv``: position fixes on the logging computer's clock, for logs without NMEA."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from sccal.arrays import Bools
+from sccal.errors import DataError
+from sccal.logs.streams import FixStream, Notice
+from sccal.logs.table import read_table
+
+_USED = ("t", "lat_deg", "lon_deg", "alt_m", "fix_quality", "sigma_m")
+
+
+def read_gnss_csv(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
+    """Read fixes: ``t,lat_deg,lon_deg`` and optionally ``alt_m,fix_quality,sigma_m`` (horizontal, per axis).
+
+    Raises:
+        DataError: unreadable file, missing columns, or no position in range.
+    """
+    table = read_table(path, (("t", "lat_deg", "lon_deg"),))
+    lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
+    quality = table.columns.get("fix_quality", np.full(lat.size, np.nan))
+    beyond: Bools = (np.abs(lat) > 90) | (np.abs(lon) > 360)
+    origin: Bools = (lat == 0) & (lon == 0)
+    none: Bools = (quality == 0) & ~beyond & ~origin
+    notices = []
+    for rows, what in (
+        (beyond, "rows with a latitude beyond 90 or a longitude beyond 360 degrees dropped"),
+        (origin, "rows at latitude 0, longitude 0 dropped"),
+        (none, "rows without a fix (fix_quality 0) dropped"),
+    ):
+        if rows.any():
+            notices.append(Notice(table.source, what, int(rows.sum()), f"line {table.line[rows][0]}"))
+    keep = ~(beyond | origin | none)
+    if not keep.any():
+        why = "; ".join(str(notice) for notice in notices)
+        raise DataError(f"{path}: none of {lat.size} rows holds a usable position: {why}")
+    table = table.keep(keep, notices)
+    n = table.line.size
+    absent = np.full(n, np.nan)
+    given = table.columns.get("fix_quality", absent)
+    codes = np.where(np.isfinite(given) & (given >= 0) & (given <= 9), given, -1)
+    sigma_m = table.columns.get("sigma_m", absent)
+    sigma_m = np.where(sigma_m > 0, sigma_m, np.nan)
+    stream = FixStream(
+        host_t_s=table.columns["t"],
+        utc_s=absent,
+        utc_has_date=False,
+        lat_deg=table.columns["lat_deg"],
+        lon_deg=(table.columns["lon_deg"] + 180) % 360 - 180,
+        alt_m=table.columns.get("alt_m", absent),
+        quality=np.round(codes).astype(np.int64),
+        sigma_east_m=sigma_m,
+        sigma_north_m=sigma_m,
+        cov_en_m2=np.zeros(n),
+        extras=table.extras(_USED),
+    )
+    return stream, table.notices

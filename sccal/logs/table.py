@@ -1,0 +1,292 @@
+"""One CSV file of numeric columns: bytes to float arrays, each row with its line in the file.
+
+A row whose required cells cannot be read is dropped and counted, never guessed. Text in a further column is an empty
+cell; a further column without any number is left out. What was met is told in notices.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from sccal.arrays import Bools, Floats, Ints
+from sccal.errors import DataError
+from sccal.logs.streams import Notice
+from sccal.logs.timeline import order_in_time
+
+_LINE_LIMIT_BYTES = 64 * 1024
+_COLUMN_LIMIT = 1000
+
+
+@dataclass(frozen=True)
+class Table:
+    """Numeric columns of one file, all of length n, with strictly increasing ``t``."""
+
+    source: str
+    columns: dict[str, Floats]
+    line: Ints
+    """Line in the file of each row, from 1."""
+    rows_seen: int
+    """Rows with any content, before rows were dropped."""
+    notices: tuple[Notice, ...]
+
+    def keep(self, rows: Bools, notices: Sequence[Notice] = ()) -> Table:
+        """The same table with only the rows where ``rows`` (n) is True, and further notices."""
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return Table(self.source, columns, self.line[rows], self.rows_seen, (*self.notices, *notices))
+
+    def extras(self, used: Sequence[str]) -> dict[str, Floats]:
+        """The columns that are not in ``used``."""
+        return {name: column for name, column in self.columns.items() if name not in used}
+
+
+def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
+    """Read a CSV whose header holds at least one of the ``alternatives`` in full; each holds ``t``.
+
+    The first alternative found is required of every row. Whole numbers from 2^63 up (unsigned 64-bit counters below
+    zero) are read as their two's complement.
+
+    Raises:
+        DataError: unreadable or empty file, a header without the required columns, or no usable row.
+    """
+    source = path.name
+    data = _load(path)
+    names, separator, header_line, body = _split_header(data, path)
+    required = _required(names, alternatives, path)
+    notices: list[Notice] = []
+    body = _without_endless_lines(body, header_line, source, notices)
+    body = _without_cut_line(body, separator, len(names), header_line, source, notices)
+    frame = _parse(body, names, separator, header_line, path, notices)
+    columns, content = _numeric_columns(frame, names, required, header_line, source, notices)
+    line = np.arange(len(frame), dtype=np.int64) + header_line + 1
+
+    readable = content.copy()
+    for name in required:
+        readable &= np.isfinite(columns[name])
+    unreadable = content & ~readable
+    if unreadable.any():
+        what = f"rows with unreadable or empty {', '.join(required)} dropped"
+        notices.append(Notice(source, what, int(unreadable.sum()), f"line {line[unreadable][0]}"))
+    rows_seen = int(content.sum())
+    if not readable.any():
+        why = "; ".join(str(notice) for notice in notices) or "nothing below the header"
+        raise DataError(
+            f"{path}: no usable row of {rows_seen}, {', '.join(required)} must be numbers in every row: {why}"
+        )
+    columns = {name: column[readable] for name, column in columns.items()}
+    line = line[readable]
+    order, order_notices = order_in_time(columns["t"], line, source)
+    columns = {name: column[order] for name, column in columns.items()}
+    return Table(source, columns, line[order], rows_seen, (*notices, *order_notices))
+
+
+def _load(path: Path) -> bytes:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+    if not data.strip(b"\0 \t\r\n"):
+        what = "is empty (0 bytes)" if not data else f"holds nothing but blanks ({len(data)} bytes)"
+        raise DataError(f"{path}: {what}; log it again or remove the run")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise DataError(f"{path}: UTF-16 text; save it as UTF-8")
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
+    return data.replace(b"\0", b"?") if b"\0" in data else data
+
+
+def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
+    """Column names, separator, the header's line number and the bytes below it."""
+    start = line = 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        line += 1
+        if end - start > _LINE_LIMIT_BYTES:
+            raise DataError(f"{path}: line {line} has {end - start} bytes without a line end; this is not a CSV file")
+        text = data[start:end].decode("utf-8", errors="replace").strip()
+        if text and not text.startswith("#"):
+            break
+        start = end + 1
+    else:
+        raise DataError(f"{path}: no header line; the first line names the columns, such as t,yaw_deg")
+    separator = next((mark for mark in ",;\t" if mark in text), ",")
+    names = [name.strip().strip('"').strip() for name in text.split(separator)]
+    if len(names) > _COLUMN_LIMIT:
+        raise DataError(f"{path}: line {line} names {len(names)} columns, more than {_COLUMN_LIMIT}; this is not a log")
+    return names, separator, line, data[end + 1 :]
+
+
+def _required(names: list[str], alternatives: Sequence[Sequence[str]], path: Path) -> Sequence[str]:
+    for alternative in alternatives:
+        if set(alternative) <= set(names):
+            return alternative
+    needed = " or ".join(",".join(alternative) for alternative in alternatives)
+    shown = ",".join(names[:20])
+    there = "".join(mark if mark.isprintable() else "?" for mark in shown)[:200]
+    raise DataError(f"{path}: the header needs {needed}; it has {there}")
+
+
+def _without_endless_lines(body: bytes, header_line: int, source: str, notices: list[Notice]) -> bytes:
+    """Blank the lines that are too long to be a row of anything."""
+    breaks = np.flatnonzero(np.frombuffer(body, dtype=np.uint8) == ord("\n"))
+    lengths = np.diff(np.concatenate(([-1], breaks, [len(body)])))
+    endless = np.flatnonzero(lengths > _LINE_LIMIT_BYTES)
+    if endless.size == 0:
+        return body
+    lines = body.split(b"\n")
+    for row in endless:
+        lines[row] = b""
+    what = f"lines of more than {_LINE_LIMIT_BYTES // 1024} kB dropped"
+    notices.append(Notice(source, what, int(endless.size), f"line {header_line + 1 + endless[0]}", "warning"))
+    return b"\n".join(lines)
+
+
+def _without_cut_line(
+    body: bytes, separator: str, width: int, header_line: int, source: str, notices: list[Notice]
+) -> bytes:
+    """Leave out a last line that ends without a line end and is shorter than the line before: a cut file."""
+    if not body or body.endswith(b"\n"):
+        return body
+    start = body.rfind(b"\n") + 1
+    before = body[body.rfind(b"\n", 0, max(start - 1, 0)) + 1 : max(start - 1, 0)]
+    mark = separator.encode()
+    last_cells, before_cells = body[start:].split(mark), before.strip().split(mark)
+    whole = len(last_cells) >= width
+    if whole and len(before_cells) >= width:
+        last, previous = last_cells[width - 1].strip(), before_cells[width - 1].strip()
+        decimals, previous_decimals = len(last.partition(b".")[2]), len(previous.partition(b".")[2])
+        whole = decimals >= previous_decimals and (b"." in last or len(last) >= len(previous))
+    if whole:
+        return body
+    line = header_line + 1 + body.count(b"\n")
+    notices.append(Notice(source, "last line cut in the middle and dropped", 1, f"line {line}"))
+    return body[:start]
+
+
+def _parse(
+    body: bytes, names: list[str], separator: str, header_line: int, path: Path, notices: list[Notice]
+) -> pd.DataFrame:
+    """A frame with one row per line of ``body``, blank lines included, and one column per name, by position."""
+    try:
+        return _pandas_frame(body, len(names), separator)
+    except (pd.errors.ParserError, pd.errors.ParserWarning):
+        pass
+    body, width = _without_long_rows(body, len(names), separator, header_line, path, notices)
+    try:
+        frame = _pandas_frame(body, width, separator)
+    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        raise DataError(f"{path}: cannot be read as CSV ({' '.join(str(error).split())})") from error
+    for position in range(len(names), width):
+        if frame[position].notna().any():
+            raise DataError(f"{path}: the header names {len(names)} columns but the rows have {width}; name them all")
+    return frame
+
+
+def _pandas_frame(body: bytes, width: int, separator: str) -> pd.DataFrame:
+    if not body:
+        return pd.DataFrame({position: np.empty(0) for position in range(width)})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        return pd.read_csv(
+            io.BytesIO(body),
+            sep=separator,
+            header=None,
+            names=list(range(width)),
+            index_col=False,
+            engine="c",
+            quoting=3,
+            skipinitialspace=True,
+            skip_blank_lines=False,
+            low_memory=False,
+            encoding="utf-8",
+            encoding_errors="replace",
+        )
+
+
+def _without_long_rows(
+    body: bytes, width: int, separator: str, header_line: int, path: Path, notices: list[Notice]
+) -> tuple[bytes, int]:
+    """Blank the lines with too many cells; where nearly every line has more cells than names, widen instead."""
+    lines = body.replace(b"\r\n", b"\n").replace(b"\r", b" ").split(b"\n")
+    mark = separator.encode()
+    cells = np.array([line.count(mark) + 1 for line in lines])
+    usual = int(np.median(cells[cells > 1])) if (cells > 1).any() else width
+    if usual > _COLUMN_LIMIT:
+        raise DataError(f"{path}: rows have {usual} cells, more than {_COLUMN_LIMIT}; this is not a log")
+    width = max(width, usual)
+    long = np.flatnonzero(cells > width)
+    for row in long:
+        lines[row] = b"?"
+    if long.size:
+        what = f"rows with more than {width} cells dropped"
+        notices.append(Notice(path.name, what, int(long.size), f"line {header_line + 1 + long[0]}"))
+    return b"\n".join(lines), width
+
+
+def _numeric_columns(
+    frame: pd.DataFrame, names: list[str], required: Sequence[str], header_line: int, source: str, notices: list[Notice]
+) -> tuple[dict[str, Floats], Bools]:
+    """The columns as floats, NaN where a cell holds no finite number, and which lines hold a row at all."""
+    columns: dict[str, Floats] = {}
+    content = np.zeros(len(frame), dtype=np.bool_)
+    comment = np.zeros(len(frame), dtype=np.bool_)
+    text_cells, text_row, text_columns, repeated = 0, math.inf, [], []
+    for position, name in enumerate(names):
+        series = frame[position]
+        filled = series.notna().to_numpy()
+        content |= filled
+        if position == 0 and _is_text(series):
+            comment = series.astype(str).str.startswith("#").to_numpy(dtype=np.bool_) & filled
+        if not name or name in columns:
+            repeated += [name] if name else []
+            continue
+        values = _floats(series)
+        values[~np.isfinite(values)] = np.nan
+        if name not in required:
+            lost = filled & np.isnan(values) & ~comment
+            if lost.any() and not np.isfinite(values).any():
+                text_columns.append(name)
+                continue
+            if lost.any():
+                text_cells += int(lost.sum())
+                text_row = min(text_row, int(np.flatnonzero(lost)[0]))
+        columns[name] = values
+    if text_cells:
+        where = f"line {header_line + 1 + int(text_row)}"
+        notices.append(Notice(source, "cells of further columns are not numbers and taken as empty", text_cells, where))
+    if text_columns:
+        shown = ", ".join(text_columns[:8])
+        notices.append(Notice(source, f"columns without numbers left out: {shown}", len(text_columns)))
+    if repeated:
+        shown = ", ".join(repeated[:8])
+        notices.append(
+            Notice(source, f"columns named twice, the first taken: {shown}", len(repeated), severity="warning")
+        )
+    return columns, content & ~comment
+
+
+def _is_text(series: pd.Series[Any]) -> bool:
+    return not (pd.api.types.is_numeric_dtype(series.dtype) or pd.api.types.is_bool_dtype(series.dtype))
+
+
+def _floats(series: pd.Series[Any]) -> Floats:
+    if _is_text(series):
+        series = pd.to_numeric(series.astype(object).map(_unquoted), errors="coerce")
+    values = series.to_numpy()
+    if values.dtype == np.uint64:
+        values = values.view(np.int64)
+    return values.astype(np.float64)
+
+
+def _unquoted(cell: object) -> object:
+    return cell.strip().strip('"').strip() if isinstance(cell, str) else cell

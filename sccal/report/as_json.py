@@ -1,0 +1,211 @@
+"""calibration.json and vehicle.json: schema ``sccal.calibration/1``, strict JSON.
+
+Angles in degrees; what is missing or not finite is null. A vehicle's file has the schema of a run's, with ``run`` set
+to VEHICLE_RUN (no folder of results can have that name on its own) and the runs themselves under ``runs``.
+The value of an unobserved parameter is its prior.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from sccal import __version__
+from sccal.calibration.result import (
+    Calibration,
+    Clock,
+    Drive,
+    Estimate,
+    Fit,
+    Noise,
+    Outage,
+    Parameters,
+    VehicleCalibration,
+)
+from sccal.logs.streams import Notice
+from sccal.report.rows import parameter_rows
+from sccal.report.verdict import run_verdict, vehicle_verdict
+
+SCHEMA = "sccal.calibration/1"
+VEHICLE_RUN = "(vehicle)"
+
+Json = dict[str, Any]
+
+
+def calibration_json(c: Calibration) -> Json:
+    """One run."""
+    return _document(
+        {
+            "schema": SCHEMA,
+            "sccal_version": __version__,
+            "run": c.run,
+            "vehicle": c.vehicle.name,
+            "variant": _variant(c.with_offset),
+            "verdict": str(run_verdict(c)),
+            "parameters": _parameters(c.parameters),
+            "effects": _effects(c.effects),
+            "origin": {"lat_deg": c.origin_lat_deg, "lon_deg": c.origin_lon_deg},
+            "fit": _fit(c.fit),
+            "outage": _outage(c.outage),
+            "noise": _noise(c.noise),
+            "drive": _drive(c.drive),
+            "clock": _clock(c.clock),
+            "notices": _notices(c.notices),
+        }
+    )
+
+
+def vehicle_json(v: VehicleCalibration) -> Json:
+    """Several runs of one vehicle as one problem."""
+    return _document(
+        {
+            "schema": SCHEMA,
+            "sccal_version": __version__,
+            "run": VEHICLE_RUN,
+            "vehicle": v.vehicle.name,
+            "variant": _variant(v.with_offset),
+            "verdict": str(vehicle_verdict(v)),
+            "parameters": _parameters(v.parameters),
+            "effects": _effects(v.effects),
+            "consistency_chi2_per_dof": v.consistency_chi2_per_dof,
+            "fit": _fit(v.fit),
+            "outage": _outage(v.outage),
+            "runs": [
+                {"run": c.run, "verdict": str(run_verdict(c)), "parameters": _parameters(c.parameters)} for c in v.runs
+            ],
+            "notices": _notices(v.notices),
+        }
+    )
+
+
+def json_text(document: Json) -> str:
+    """As it stands in a file: indented, UTF-8, one newline at the end."""
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _variant(with_offset: bool) -> str:
+    return "sc_ekf_offset" if with_offset else "sc_ekf"
+
+
+def _parameters(parameters: Parameters) -> Json:
+    return {row.key: _estimate(row.estimate) for row in parameter_rows(parameters)}
+
+
+def _effects(effects: Mapping[str, Mapping[str, Estimate]]) -> Json:
+    return {effect: {name: _estimate(e) for name, e in named.items()} for effect, named in effects.items()}
+
+
+def _estimate(estimate: Estimate) -> Json:
+    return {
+        "value": estimate.value,
+        "sigma": estimate.sigma,
+        "status": estimate.status,
+        "reason": estimate.reason,
+        "nominal": estimate.nominal,
+        "prior_sigma": estimate.prior_sigma,
+    }
+
+
+def _fit(fit: Fit) -> Json:
+    return {
+        "gnss_innovation_rms_m": fit.gnss_innovation_rms_m,
+        "heading_innovation_rms_deg": math.degrees(fit.heading_innovation_rms_rad),
+        "nis_gnss": fit.nis_gnss,
+        "nis_heading": fit.nis_heading,
+        "fixes_used": fit.fixes_used,
+        "fixes_rejected": fit.fixes_rejected,
+        "headings_used": fit.headings_used,
+        "headings_rejected": fit.headings_rejected,
+        "recoveries": fit.recoveries,
+    }
+
+
+def _outage(outage: Outage) -> Json:
+    return {
+        "window_s": outage.window_s,
+        "windows": len(outage.windows),
+        "rms_m": outage.rms_m,
+        "end_rms_m": outage.end_rms_m,
+        "percent_of_distance": outage.percent_of_distance,
+        "how": outage.how,
+        "each": [
+            {
+                "start_s": window.start_s,
+                "end_s": window.end_s,
+                "distance_m": window.distance_m,
+                "rms_m": window.rms_drift_m,
+                "end_m": window.end_drift_m,
+            }
+            for window in outage.windows
+        ],
+    }
+
+
+def _noise(noise: Noise) -> Json:
+    return {
+        "heading_white_deg": math.degrees(noise.heading_white_rad),
+        "heading_coloured_deg": math.degrees(noise.heading_coloured_rad),
+        "heading_tau_s": noise.heading_tau_s,
+        "fix_scale": noise.fix_scale,
+        "other_fix_scale": {str(quality): scale for quality, scale in noise.other_fix_scale.items()},
+        "fix_coloured_m": noise.fix_coloured_m,
+        "fix_tau_s": noise.fix_tau_s,
+        "slip_m_per_sqrt_m": noise.slip_m_per_sqrt_m,
+        "source": noise.source,
+    }
+
+
+def _drive(drive: Drive) -> Json:
+    return {
+        "duration_s": drive.duration_s,
+        "distance_m": drive.distance_m,
+        "reversed_m": drive.reversed_m,
+        "standing_s": drive.standing_s,
+        "max_speed_mps": drive.max_speed_mps,
+        "turned_left_deg": math.degrees(drive.turned_left_rad),
+        "turned_right_deg": math.degrees(drive.turned_right_rad),
+    }
+
+
+def _clock(clock: Clock) -> Json:
+    return {
+        "source": clock.source,
+        "offset_s": clock.offset_s,
+        "skew_ppm": clock.skew_ppm,
+        "jitter_s": clock.jitter_s,
+        "knots": clock.knots,
+    }
+
+
+def _notices(notices: Iterable[Notice]) -> list[Json]:
+    return [
+        {
+            "source": notice.source,
+            "what": notice.what,
+            "count": notice.count,
+            "where": notice.where,
+            "severity": notice.severity,
+            "text": str(notice),
+        }
+        for notice in notices
+    ]
+
+
+def _document(blocks: Json) -> Json:
+    return {name: _strict(block) for name, block in blocks.items()}
+
+
+def _strict(node: Any) -> Any:
+    """Only what RFC 8259 knows: finite numbers (numpy's scalars become Python's), and text that encodes as UTF-8."""
+    if isinstance(node, str):
+        return node.encode("utf-8", "backslashreplace").decode("utf-8")
+    if node is None or isinstance(node, bool):
+        return node
+    if isinstance(node, Mapping):
+        return {_strict(key): _strict(value) for key, value in node.items()}
+    if isinstance(node, Sequence):
+        return [_strict(value) for value in node]
+    number = node.item() if hasattr(node, "item") else node
+    return None if isinstance(number, float) and not math.isfinite(number) else number

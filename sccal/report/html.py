@@ -1,0 +1,109 @@
+"""report.html and the vehicle's page: one self-contained file each, readable on a phone, on paper, and in the dark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from sccal import __version__
+from sccal.calibration.result import Calibration, Fit, Outage, VehicleCalibration
+from sccal.report.figures import run_drawings, vehicle_drawings
+from sccal.report.numbers import duration, one_line, plain, short
+from sccal.report.rows import Row, effect_rows, parameter_rows
+from sccal.report.summary import (
+    clock_line,
+    drive_line,
+    fixes_line,
+    headings_line,
+    noise_facts,
+    outage_line,
+    recoveries_line,
+    warnings_first,
+)
+from sccal.report.verdict import Verdict, run_verdict, vehicle_verdict
+
+_PAGES = Environment(
+    loader=PackageLoader("sccal.report", "templates"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    keep_trailing_newline=True,
+)
+
+
+@dataclass(frozen=True)
+class RunLine:
+    """One line of the vehicle's table of runs."""
+
+    name: str
+    link: str
+    rows: tuple[Row, ...]
+    drift: str
+    verdict: Verdict
+
+
+def run_html(c: Calibration) -> str:
+    """The page of one run."""
+    return _page(
+        "run.html.j2",
+        c=c,
+        verdict=run_verdict(c),
+        rows=(*parameter_rows(c.parameters), *effect_rows(c.effects)),
+        drive=drive_line(c.drive),
+        drawings=run_drawings(c),
+        fit=_fit_facts(c.fit, c.outage),
+        noise=(*noise_facts(c.noise), ("clock", clock_line(c.clock))),
+        notices=warnings_first(c.notices),
+        origin=f"{c.origin_lat_deg:.7f}, {c.origin_lon_deg:.7f}",
+        version=__version__,
+        variant=_variant(c.with_offset),
+    )
+
+
+def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
+    """The page of several runs; it links to each run's own page, ``<run>/report.html``."""
+    count = f"{len(v.runs)} run{'' if len(v.runs) == 1 else 's'}"
+    time = duration(sum(c.drive.duration_s for c in v.runs))
+    chi2 = v.consistency_chi2_per_dof
+    agreement = "" if chi2 is None else f"agree to chi2 per dof {short(chi2, 3)} (1 is consistent)"
+    return _page(
+        "vehicle.html.j2",
+        v=v,
+        verdict=vehicle_verdict(v),
+        rows=(*parameter_rows(v.parameters), *effect_rows(v.effects)),
+        runs=[_run_line(c) for c in v.runs],
+        total=f"{count} · {time} · {plain(sum(c.drive.distance_m for c in v.runs))} m",
+        drawings=vehicle_drawings(v),
+        fit=(("runs", agreement), *_fit_facts(v.fit, v.outage)),
+        notices=warnings_first(v.notices),
+        version=__version__,
+        variant=_variant(v.with_offset),
+        json_link=json_link,
+    )
+
+
+def _page(template: str, **content: object) -> str:
+    """Names from a file system may hold what UTF-8 cannot; it becomes a question mark."""
+    return _PAGES.get_template(template).render(content).encode("utf-8", "replace").decode("utf-8")
+
+
+def _run_line(c: Calibration) -> RunLine:
+    drift = "–" if c.outage.end_rms_m is None else plain(c.outage.end_rms_m, 2)
+    link = "./" + quote(c.run, errors="replace") + "/report.html"
+    return RunLine(one_line(c.run), link, parameter_rows(c.parameters), drift, run_verdict(c))
+
+
+def _fit_facts(fit: Fit, outage: Outage) -> tuple[tuple[str, str], ...]:
+    return (
+        ("fixes", fixes_line(fit)),
+        ("heading", headings_line(fit)),
+        ("filter", recoveries_line(fit)),
+        ("outage", outage_line(outage)),
+        ("how", one_line(outage.how) if outage.windows else ""),
+    )
+
+
+def _variant(with_offset: bool) -> str:
+    return "SC EKF with offset estimation" if with_offset else "SC EKF"

@@ -1,0 +1,99 @@
+"""The rows that every table of parameters shows, in display units: the text, the page and the JSON agree by this."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from sccal.calibration.result import Estimate, Parameters, Status
+from sccal.report.numbers import MISSING, change_percent, one_line, short, value_and_sigma, with_sigma, wrapped_deg
+
+STATUS_WORDS: Mapping[Status, str] = {
+    "estimated": "estimated",
+    "unobserved": "not observed",
+    "at_bound": "at bound",
+    "held": "held",
+}
+
+_UNITS = ("deg_per_hour", "deg_per_mps", "per_radps", "per_mps2", "per_mps", "per_hour", "deg", "ppm", "at_s", "m", "s")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One parameter, its angles in degrees."""
+
+    key: str
+    """As in calibration.json: ``radius_right_m``."""
+    name: str
+    unit: str
+    estimate: Estimate
+
+    @property
+    def value(self) -> str:
+        """Without unit, rounded by sigma."""
+        return value_and_sigma(self.estimate.value, self.estimate.sigma)[0]
+
+    @property
+    def sigma(self) -> str:
+        return value_and_sigma(self.estimate.value, self.estimate.sigma)[1]
+
+    @property
+    def value_with_sigma(self) -> str:
+        return with_sigma(self.estimate.value, self.estimate.sigma)
+
+    @property
+    def nominal(self) -> str:
+        return "" if self.estimate.nominal is None else short(self.estimate.nominal)
+
+    @property
+    def change(self) -> str:
+        if self.estimate.nominal is None or self.unit == "deg":
+            return ""
+        text = change_percent(self.estimate.value, self.estimate.sigma, self.estimate.nominal)
+        return "" if text == MISSING else text
+
+    @property
+    def status(self) -> str:
+        return STATUS_WORDS[self.estimate.status]
+
+    @property
+    def reason(self) -> str:
+        return one_line(self.estimate.reason)
+
+
+def parameter_rows(parameters: Parameters) -> tuple[Row, Row, Row, Row]:
+    """The four constants of the paper's state, the heading offset in degrees."""
+    return (
+        Row("radius_right_m", "right radius", "m", parameters.radius_right_m),
+        Row("radius_left_m", "left radius", "m", parameters.radius_left_m),
+        Row("track_m", "track", "m", parameters.track_m),
+        Row("heading_offset_deg", "heading offset", "deg", offset_in_degrees(parameters.heading_offset_rad)),
+    )
+
+
+def effect_rows(effects: Mapping[str, Mapping[str, Estimate]]) -> tuple[Row, ...]:
+    """Effects beyond the model; their parameters' names already carry the unit of a file."""
+    return tuple(
+        Row(f"{effect}.{name}", f"{effect} {name}".replace("_", " "), _unit_of(name), estimate)
+        for effect, parameters in effects.items()
+        for name, estimate in parameters.items()
+    )
+
+
+def offset_in_degrees(offset: Estimate) -> Estimate:
+    """The heading offset wrapped into (−180, 180]; its spreads only converted."""
+    return replace(
+        offset,
+        value=wrapped_deg(offset.value),
+        sigma=math.degrees(offset.sigma),
+        nominal=None if offset.nominal is None else wrapped_deg(offset.nominal),
+        prior_sigma=None if offset.prior_sigma is None else math.degrees(offset.prior_sigma),
+    )
+
+
+def _unit_of(name: str) -> str:
+    for unit in _UNITS:
+        if name == unit or name.endswith(f"_{unit}"):
+            return "s" if unit == "at_s" else unit
+    return ""

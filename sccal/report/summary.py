@@ -1,0 +1,108 @@
+"""One line each for fit, outage, noise, clock and drive: the same words in the terminal and on the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from sccal.calibration.result import Clock, Drive, Fit, Noise, Outage
+from sccal.logs.streams import Notice
+from sccal.report.numbers import MISSING, duration, one_line, plain, short
+
+
+def fixes_line(fit: Fit) -> str:
+    """Innovations of the position fixes."""
+    counts = _counts(fit.fixes_used, fit.fixes_rejected)
+    return f"innovation {_measured(fit.gnss_innovation_rms_m, 'm')} rms, NIS {short(fit.nis_gnss, 3)}, {counts}"
+
+
+def headings_line(fit: Fit) -> str:
+    """Innovations of the AHRS readings."""
+    counts = _counts(fit.headings_used, fit.headings_rejected)
+    rms_deg = math.degrees(fit.heading_innovation_rms_rad)
+    return f"innovation {_measured(rms_deg, 'deg')} rms, NIS {short(fit.nis_heading, 3)}, {counts}"
+
+
+def recoveries_line(fit: Fit) -> str:
+    """Empty where there was none."""
+    if not fit.recoveries:
+        return ""
+    times = "once" if fit.recoveries == 1 else f"{fit.recoveries} times"
+    return f"the filter had locked itself out and was opened again {times}"
+
+
+def outage_line(outage: Outage) -> str:
+    """Drift at the end of the windows without fixes, then on the way."""
+    window = short(outage.window_s)
+    count = len(outage.windows)
+    if outage.end_rms_m is None:
+        return f"drift without fixes: no window of {window} s fits into the data"
+    share = "" if outage.percent_of_distance is None else f" ({plain(outage.percent_of_distance, 2)} % of distance)"
+    return (
+        f"drift after {window} s without fixes: {_measured(outage.end_rms_m, 'm', 2)} rms{share}, "
+        f"{count} window{'' if count == 1 else 's'}"
+    )
+
+
+def noise_facts(noise: Noise) -> tuple[tuple[str, str], ...]:
+    """Heading, fixes and wheels, as the filter used them."""
+    white = _measured(math.degrees(noise.heading_white_rad), "deg", 2)
+    return (
+        ("heading", f"{white} white{_coloured(math.degrees(noise.heading_coloured_rad), 'deg', noise.heading_tau_s)}"),
+        ("fixes", f"{plain(noise.fix_scale, 2)} x stated sigma{_coloured(noise.fix_coloured_m, 'm', noise.fix_tau_s)}"),
+        ("wheels", f"{_measured(noise.slip_m_per_sqrt_m, 'm', 2)} after 1 m, growing with the root of distance"),
+        ("source", "estimated from the log" if noise.source == "estimated" else "given, not estimated"),
+    )
+
+
+def clock_line(clock: Clock) -> str:
+    """How the fixes came onto the logging clock."""
+    if clock.source == "host":
+        return "fixes at their receive times, as logged"
+    way = "the logging clock is Unix time" if clock.source == "utc" else "receiver epochs mapped onto the logging clock"
+    steered = f", steered ({clock.knots} knots)" if clock.knots > 2 else ""
+    jitter = plain(1e3 * clock.jitter_s, 2) if math.isfinite(clock.jitter_s) else MISSING
+    return f"{way}: {_signed(clock.offset_s)} s, skew {_signed(clock.skew_ppm)} ppm, jitter {jitter} ms{steered}"
+
+
+def drive_line(drive: Drive) -> str:
+    """What the driver can change next time."""
+    turned = f"turned {_degrees(drive.turned_left_rad)} left, {_degrees(drive.turned_right_rad)} right"
+    return (
+        f"{duration(drive.duration_s)}, {plain(drive.distance_m)} m ({plain(drive.reversed_m)} m backwards), "
+        f"up to {plain(drive.max_speed_mps, 2)} m/s, standing {duration(drive.standing_s)}, {turned}"
+    )
+
+
+def warnings_first(notices: Iterable[Notice]) -> list[Notice]:
+    """Warnings before the rest, otherwise in the order in which they were met."""
+    return sorted(notices, key=lambda notice: notice.severity != "warning")
+
+
+def notice_text(notice: Notice) -> str:
+    """On one line, whatever a file's name or cells held."""
+    return one_line(str(notice))
+
+
+def _counts(used: int, rejected: int) -> str:
+    return f"{used} used, {rejected} rejected"
+
+
+def _measured(value: float, unit: str, digits: int = 3) -> str:
+    text = plain(value, digits)
+    return text if text == MISSING else f"{text} {unit}"
+
+
+def _coloured(sigma: float, unit: str, tau_s: float) -> str:
+    if not sigma > 0.0:
+        return ""
+    return f" + {plain(sigma, 2)} {unit} over {plain(tau_s, 2)} s"
+
+
+def _signed(value: float) -> str:
+    text = plain(value, 4)
+    return text if text.startswith("-") or text in (MISSING, "0") else f"+{text}"
+
+
+def _degrees(angle_rad: float) -> str:
+    return f"{math.degrees(angle_rad):.0f} deg" if math.isfinite(angle_rad) else MISSING

@@ -1,0 +1,98 @@
+"""The first line of every report: may these numbers be used? Decided from statuses and figures of fit, nothing else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from sccal.calibration.result import Calibration, Estimate, Fit, Parameters, VehicleCalibration
+from sccal.report.numbers import short
+from sccal.report.rows import parameter_rows
+
+NIS_LOW = 0.3
+NIS_HIGH = 3.0
+"""Between these the stated noise explains the innovations; outside, every sigma is off by more than about √3."""
+REJECTED_MOST = 0.2
+"""Share of measurements that may be rejected before the accepted ones stop being the rule."""
+CONSISTENCY_HIGH = 3.0
+"""χ² per degree of freedom of the runs about the shared parameters."""
+
+Level = Literal["good", "partial", "doubtful"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """good: use it. partial: use what was estimated. doubtful: find out why before using it."""
+
+    level: Level
+    because: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.level}: {'; '.join(self.because)}"
+
+
+def run_verdict(calibration: Calibration) -> Verdict:
+    """Of one run."""
+    return _verdict(calibration.parameters, calibration.fit, calibration.with_offset, ())
+
+
+def vehicle_verdict(vehicle: VehicleCalibration) -> Verdict:
+    """Of several runs taken as one problem; also asks whether they agree with each other."""
+    chi2 = vehicle.consistency_chi2_per_dof
+    disagreement = (
+        (f"the runs disagree about the shared parameters (chi2 per dof {short(chi2, 3)})",)
+        if chi2 is not None and not chi2 <= CONSISTENCY_HIGH
+        else ()
+    )
+    return _verdict(vehicle.parameters, vehicle.fit, vehicle.with_offset, disagreement)
+
+
+def _verdict(parameters: Parameters, fit: Fit, with_offset: bool, further_doubts: Iterable[str]) -> Verdict:
+    wanted = [
+        (row.key, row.estimate) for row in parameter_rows(parameters) if with_offset or row.key != "heading_offset_deg"
+    ]
+    doubts = [*_parameter_doubts(wanted), *_fit_doubts(fit), *further_doubts]
+    lacks = [
+        f"{key} {'not observed' if estimate.status == 'unobserved' else 'held'}"
+        for key, estimate in wanted
+        if estimate.status in ("unobserved", "held")
+    ]
+    if len(lacks) == len(wanted):
+        doubts.append("no parameter could be estimated")
+        lacks = []
+    if doubts:
+        return Verdict("doubtful", (*doubts, *lacks))
+    if lacks:
+        return Verdict("partial", tuple(lacks))
+    count = {3: "three", 4: "four"}[len(wanted)]
+    return Verdict("good", (f"all {count} parameters estimated, predictions consistent with the measurements",))
+
+
+def _parameter_doubts(wanted: Iterable[tuple[str, Estimate]]) -> list[str]:
+    doubts = []
+    for key, estimate in wanted:
+        if not math.isfinite(estimate.value):
+            doubts.append(f"{key} has no value")
+        elif estimate.status == "at_bound":
+            doubts.append(f"{key} at its bound")
+        elif estimate.status == "estimated" and not (math.isfinite(estimate.sigma) and estimate.sigma > 0.0):
+            doubts.append(f"{key} has no sigma")
+    return doubts
+
+
+def _fit_doubts(fit: Fit) -> list[str]:
+    doubts = []
+    for what, used, rejected, nis in (
+        ("fixes", fit.fixes_used, fit.fixes_rejected, fit.nis_gnss),
+        ("headings", fit.headings_used, fit.headings_rejected, fit.nis_heading),
+    ):
+        if used + rejected == 0:
+            doubts.append(f"no {what}")
+            continue
+        if rejected > REJECTED_MOST * (used + rejected):
+            doubts.append(f"{100.0 * rejected / (used + rejected):.0f} % of the {what} rejected")
+        if used and not NIS_LOW <= nis <= NIS_HIGH:
+            doubts.append(f"{what} do not fit their noise (NIS {short(nis, 3)}, consistent is 1)")
+    return doubts

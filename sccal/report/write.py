@@ -1,0 +1,39 @@
+"""Results into folders; a reader meets each file whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sccal.calibration.result import Calibration, VehicleCalibration
+from sccal.logs.write import write_text
+from sccal.report.as_json import calibration_json, json_text, vehicle_json
+from sccal.report.ros2_control import ros2_control_yaml
+from sccal.report.trajectory import trajectory_csv, trajectory_tum
+
+
+def write_numbers(c: Calibration, folder: Path) -> None:
+    """Everything of a run but the page, and so without matplotlib: JSON, both trajectories, YAML."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "calibration.json", json_text(calibration_json(c)))
+    write_text(folder / "trajectory.csv", trajectory_csv(c.trajectory))
+    write_text(folder / "trajectory.tum", trajectory_tum(c.trajectory))
+    write_text(folder / "ros2_control.yaml", ros2_control_yaml(c))
+
+
+def write_calibration(c: Calibration, folder: Path) -> None:
+    """The five files of a run."""
+    from sccal.report.html import run_html
+
+    write_numbers(c, folder)
+    write_text(folder / "report.html", run_html(c))
+
+
+def write_vehicle(v: VehicleCalibration, out: Path, stem: str = "vehicle") -> None:
+    """``<stem>.json``, ``<stem>.html`` and the parameters to deploy; the page expects each run's folder beside it."""
+    from sccal.report.html import vehicle_html
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / f"{stem}.json", json_text(vehicle_json(v)))
+    yaml_name = "ros2_control.yaml" if stem == "vehicle" else f"{stem}-ros2_control.yaml"
+    write_text(out / yaml_name, ros2_control_yaml(v))
+    write_text(out / f"{stem}.html", vehicle_html(v, json_link=f"{stem}.json"))
