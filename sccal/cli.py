@@ -76,6 +76,9 @@ def calibrate(
     radius_prior: Annotated[
         float, typer.Option(help="Prior sigma of each wheel radius, % of nominal.", min=0.01)
     ] = 10.0,
+    difference_prior: Annotated[
+        float, typer.Option(help="Prior sigma of the radii's difference, % of nominal.", min=0.001)
+    ] = 4.0,
     track_prior: Annotated[float, typer.Option(help="Prior sigma of the track width, % of nominal.", min=0.01)] = 30.0,
     radius_walk: Annotated[float, typer.Option(help="Random walk of each radius, ppm per √s.", min=0.0)] = 1.0,
     track_walk: Annotated[float, typer.Option(help="Random walk of the track, ppm per √s.", min=0.0)] = 3.0,
@@ -96,6 +99,7 @@ def calibrate(
         filter=FilterOptions(
             with_offset=not no_offset,
             radius_prior=radius_prior / 100.0,
+            radius_difference_prior=difference_prior / 100.0,
             track_prior=track_prior / 100.0,
             radius_walk=radius_walk * 1e-6,
             track_walk=track_walk * 1e-6,

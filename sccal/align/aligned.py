@@ -18,7 +18,7 @@ from sccal.align.signs import check_signs
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
-from sccal.logs.streams import Convention, Notice, Run, Vehicle
+from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 
 MIN_MEASUREMENTS = 10
 
@@ -74,13 +74,15 @@ def align(run: Run) -> Aligned:
     """
     notices = list(run.notices)
     wheels, heading, fixes = run.wheels, run.heading, run.fixes
+    whole = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
+    require_overlap(heading.t_s, whole, Clock("host", 0.0, 0.0, 0.0, 2), "ahrs.csv")
+    wheels = _from_first_heading(wheels, heading)
     span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
 
     t_s, timed, clock = fixes_on_host_clock(fixes, span)
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
     require_overlap(t_s[timed], span, clock, "the fixes")
-    require_overlap(heading.t_s, span, Clock("host", 0, 0, 0, 2), "ahrs.csv")
 
     good = timed & usable(fixes.quality)
     for code in np.unique(fixes.quality[timed & ~good]):
@@ -145,12 +147,25 @@ def align(run: Run) -> Aligned:
     return aligned
 
 
+def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStream:
+    """The wheels from the last sample before the first heading on: nothing earlier says where the robot headed."""
+    first = max(int(np.searchsorted(wheels.t_s, heading.t_s[0], side="right")) - 1, 0)
+    if wheels.t_s.size - first < MIN_MEASUREMENTS:
+        raise DataError(
+            f"ahrs.csv begins at {heading.t_s[0]:.3f} s, and only {wheels.t_s.size - first} encoder samples follow: the "
+            "streams must overlap for at least some seconds"
+        )
+    return WheelStream(
+        wheels.t_s[first:], wheels.left_rad[first:], wheels.right_rad[first:], wheels.loose[first:], wheels.extras
+    )
+
+
 def _inside(t_s: Floats, span: tuple[float, float], source: str, notices: list[Notice]) -> Bools:
     """Which times lie within the wheels' span; the others are counted."""
     inside = np.asarray((t_s >= span[0]) & (t_s <= span[1]))
     outside = int((np.isfinite(t_s) & ~inside).sum())
     if outside:
-        notices.append(Notice(source, "measurements before the first or after the last encoder sample not used", outside))
+        notices.append(Notice(source, "measurements outside the time that wheels and heading share not used", outside))
     return inside
 
 

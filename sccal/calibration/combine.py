@@ -20,7 +20,7 @@ from sccal.arrays import Floats
 from sccal.calibration.outage import summarise
 from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 from sccal.calibration.status import judge
-from sccal.filter.forward import bounds, prior_sigmas
+from sccal.filter.forward import bounds, prior_covariance
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import Constants
 from sccal.logs.streams import Notice
@@ -104,7 +104,7 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
 
 
 def _prior_precision(problem: RunProblem) -> Floats:
-    return np.diag(1.0 / prior_sigmas(problem.aligned.vehicle, problem.options) ** 2)
+    return np.asarray(np.linalg.inv(prior_covariance(problem.aligned.vehicle, problem.options)))
 
 
 def _rough_mean(runs: Sequence[Calibration]) -> Floats:

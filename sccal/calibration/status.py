@@ -6,7 +6,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Drive, Estimate, Parameters
-from sccal.filter.forward import bounds, prior_sigmas
+from sccal.filter.forward import bounds, prior_covariance
 from sccal.filter.options import FilterOptions
 from sccal.logs.streams import Vehicle
 
@@ -25,7 +25,7 @@ def judge(
 ) -> Parameters:
     """Parameters from R_r, R_l, L, Ofs (4,) and their covariance (4, 4)."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    prior = prior_sigmas(vehicle, options)
+    prior = np.sqrt(np.diag(prior_covariance(vehicle, options)))
     nominal = np.array([vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m])
     lower, upper = bounds(vehicle, options)
     names = ("right radius", "left radius", "track")

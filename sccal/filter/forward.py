@@ -116,10 +116,9 @@ class Filter:
             total=np.zeros(2),
         )
 
-    def begin(self, start: Start, constants: Constants, vehicle: Vehicle, priors: Floats | None = None) -> None:
-        """Set state and covariance at the first event; priors are standard deviations of R_r, R_l, L."""
+    def begin(self, start: Start, constants: Constants, vehicle: Vehicle) -> None:
+        """Set state and covariance at the first event, with the usual priors around the given constants."""
         options = self.options
-        sigma = prior_sigmas(vehicle, options) if priors is None else priors
         offset = start.offset_rad if options.with_offset else 0.0
         self.x[:] = 0.0
         self.x[:3] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
@@ -128,11 +127,11 @@ class Filter:
         variance = np.zeros(self.states)
         variance[:2] = start.sigma_position_m**2
         variance[2] = start.sigma_yaw_rad**2
-        variance[3:6] = sigma**2
         variance[6] = options.offset_prior_rad**2 if options.with_offset else 0.0
         variance[7] = self.model.heading_coloured_var
         variance[8:10] = self.model.fix_coloured_var
         self.P[:] = np.diag(variance)
+        self.P[3:6, 3:6] = prior_covariance(vehicle, options)
         self.memory[:] = 0.0
         self.memory[: kernel.MEM_FIX_T + 1] = self.events.t_s[0]
         self.output.total[:] = 0.0
@@ -186,10 +185,13 @@ class Filter:
         )
 
 
-def prior_sigmas(vehicle: Vehicle, options: FilterOptions) -> Floats:
-    """Prior standard deviations of R_r, R_l, L (m)."""
-    radius = options.radius_prior * vehicle.wheel_radius_m
-    return np.array([radius, radius, options.track_prior * vehicle.track_m])
+def prior_covariance(vehicle: Vehicle, options: FilterOptions) -> Floats:
+    """Prior covariance of R_r, R_l, L (3, 3), m²: common and differential error of the radii, and the track's."""
+    radius2 = (options.radius_prior * vehicle.wheel_radius_m) ** 2
+    difference2 = (options.radius_difference_prior * vehicle.wheel_radius_m) ** 2
+    shared = radius2 - 0.5 * min(difference2, 2.0 * radius2)
+    track2 = (options.track_prior * vehicle.track_m) ** 2
+    return np.array([[radius2, shared, 0.0], [shared, radius2, 0.0], [0.0, 0.0, track2]])
 
 
 def bounds(vehicle: Vehicle, options: FilterOptions) -> tuple[Floats, Floats]:
@@ -223,6 +225,7 @@ def make_model(
         upper=upper,
         heading_gate=options.gate_sigmas**2,
         fix_gate=-2.0 * float(np.log(outside)),
+        soft_gate=options.soft_gate,
         recover_count=float(options.recover_count),
         recover_s=options.recover_s,
         use_offset=options.with_offset,

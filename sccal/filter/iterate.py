@@ -13,7 +13,7 @@ import numpy as np
 
 from sccal.align import Aligned, Timeline, clear_steps
 from sccal.arrays import Floats
-from sccal.filter.forward import Filter, ForwardPass, Noise, bounds, prior_sigmas
+from sccal.filter.forward import Filter, ForwardPass, Noise, bounds, prior_covariance
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start
 
@@ -56,7 +56,7 @@ def iterate(problem: RunProblem, first: Constants, max_rounds: int = MAX_ROUNDS)
     """
     vehicle = problem.aligned.vehicle
     nominal = Constants.nominal(vehicle).as_array()
-    information = np.diag(1.0 / prior_sigmas(vehicle, problem.options) ** 2)
+    information = np.linalg.inv(prior_covariance(vehicle, problem.options))
     lower, upper = bounds(vehicle, problem.options)
     at = np.clip(first.as_array(), lower, upper)
     for _ in range(max_rounds):

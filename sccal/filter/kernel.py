@@ -108,6 +108,7 @@ class Model(NamedTuple):
     upper: Floats  # (3,)
     heading_gate: float  # χ² with 1 degree of freedom
     fix_gate: float  # χ² with 2 degrees of freedom
+    soft_gate: bool  # instead of the gates: weigh each measurement by its probability of being no outlier
     recover_count: float  # rejected in a row …
     recover_s: float  # … for so long: the filter opens up again
     use_offset: bool
@@ -392,11 +393,16 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
                 s += columns.heading[h, k] * v[10 + columns.heading_param[k]]
             nu = wrap_angle(events.yaw_rad[h] - predicted)
             nis = nu * nu / s
-            ok = nis <= model.heading_gate
+            inlier = log_inlier - 0.5 * (nis + math.log(TWO_PI * s))
+            weight = 1.0
+            if model.soft_gate:
+                weight = 1.0 / (1.0 + math.exp(min(log_outlier_heading - inlier, 50.0)))
+                ok = weight > 0.5
+            else:
+                ok = nis <= model.heading_gate
             out.heading_nu[h] = nu
             out.heading_var[h] = s
             out.heading_ok[h] = ok
-            inlier = log_inlier - 0.5 * (nis + math.log(TWO_PI * s))
             out.total[0] -= (
                 inlier + math.log1p(math.exp(log_outlier_heading - inlier))
                 if inlier > log_outlier_heading
@@ -413,7 +419,7 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
                     memory[6] += 1.0
             else:
                 memory[4] = 0.0
-                inv_s = 1.0 / s
+                inv_s = weight / s
                 gain = nu * inv_s
                 for q in range(n):
                     x[q] += v[q] * gain
@@ -475,14 +481,19 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
             s_n = snn - sen * ratio
             rest_n = nu_n - ratio * nu_e
             nis = nu_e * nu_e / see + rest_n * rest_n / s_n
-            ok = nis <= model.fix_gate
+            inlier = log_inlier - 0.5 * (nis + math.log(see * s_n)) - math.log(TWO_PI)
+            weight = 1.0
+            if model.soft_gate:
+                weight = 1.0 / (1.0 + math.exp(min(log_outlier_fix - inlier, 50.0)))
+                ok = weight > 0.5
+            else:
+                ok = nis <= model.fix_gate
             out.fix_nu[f, 0] = nu_e
             out.fix_nu[f, 1] = nu_n
             out.fix_var[f, 0] = see
             out.fix_var[f, 1] = snn
             out.fix_var[f, 2] = sen
             out.fix_ok[f] = ok
-            inlier = log_inlier - 0.5 * (nis + math.log(see * s_n)) - math.log(TWO_PI)
             out.total[1] -= (
                 inlier + math.log1p(math.exp(log_outlier_fix - inlier))
                 if inlier > log_outlier_fix
@@ -504,10 +515,10 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
                     memory[8] += 1.0
                     if memory[8] >= 10.0 * model.recover_count:
                         memory[7] = 0.0
-                    inv_e = 1.0 / see
+                    inv_e = weight / see
                     for q in range(n):
                         w[q] -= ratio * v[q]
-                    inv_n = 1.0 / s_n
+                    inv_n = weight / s_n
                     gain_e = nu_e * inv_e
                     gain_n = rest_n * inv_n
                     for q in range(n):

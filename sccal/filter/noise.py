@@ -8,12 +8,12 @@ filter itself over a stretch of the run, with wide log-normal priors that only m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
-from sccal.align import Aligned, build_timeline
+from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
 from sccal.arrays import Floats
 from sccal.filter.forward import Noise
@@ -52,51 +52,93 @@ def _scales(fix_sigma_m: float) -> tuple[_Scale, ...]:
 
 
 def estimate_noise(aligned: Aligned, start: Start, options: FilterOptions, heading_rate_hz: float) -> Noise:
-    """The log's own noise: first rough constants under assumed noise, then the noise given them."""
-    fix_sigma = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
-    scales = _scales(fix_sigma)
-    others = _other_scales(aligned, start)
-    centre = np.log([s.centre for s in scales])
-    width = np.array([s.width for s in scales])
-    free = np.ones(centre.size, dtype=bool)
-    if not options.with_offset:
-        free[[1, 2]] = False
+    """The log's own noise: first rough constants under assumed noise, then the noise given them.
 
-    first = centre.copy()
-    white = max(_white_level_m(aligned, start, aligned.fix_leading), 1e-4) / fix_sigma
-    first[3] = np.log(np.clip(white, scales[3].low, scales[3].high))
-    first[4] = np.log(np.clip(white * fix_sigma, scales[4].low, scales[4].high))
-
-    def noise_at(logs: Floats) -> Noise:
-        return Noise(*(float(v) for v in np.exp(logs)), other_fix_scale=others)
-
+    A coarse search over thinned measurements finds the right hill (a correlated fix error and a slipping wheel can
+    both carry the blame), and a fine one over all of them its top.
+    """
+    soft = replace(options, soft_gate=True)
+    likelihood = _Likelihood(aligned, start, soft)
     begin = aligned.span_s[0]
     still = start.moving_from_s - begin
     stretch = (begin, (start.moving_from_s if still > 0.25 * STRETCH_S else begin) + STRETCH_S)
-    timeline = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
-    rough = RunProblem(aligned, timeline, start, noise_at(first), options)
-    mode, _ = iterate(rough, coarse_constants(aligned, start), max_rounds=3)
-    constants = Constants(*(float(v) for v in mode[:3]))
+    coarse = build_timeline(aligned, 0.01, 2.0, 1.0, stretch, 5.0)
+    fine = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
 
-    clear = rough.clear_steps(constants)
+    constants = coarse_constants(aligned, start)
+    first = min(likelihood.hills(), key=lambda logs: likelihood.settled(coarse, logs, constants)[0])
+    _, constants = likelihood.settled(coarse, first, constants)
+    hill = likelihood.climb(coarse, first, constants, "Powell", {"maxfev": 400, "xtol": 0.1, "ftol": 1e-4})
+    _, constants = likelihood.settled(coarse, hill, constants)
+    top = likelihood.climb(fine, hill, constants, "L-BFGS-B", {"eps": 0.02, "maxfun": 130, "maxls": 8, "ftol": 1e-6})
+    return likelihood.noise(top)
 
-    def cost(part: Floats) -> float:
-        logs = centre.copy()
-        logs[free] = part
-        problem = RunProblem(aligned, timeline, start, noise_at(logs), options)
+
+class _Likelihood:
+    """Negative log-posterior of the noise levels' logarithms for one run."""
+
+    def __init__(self, aligned: Aligned, start: Start, options: FilterOptions) -> None:
+        self.aligned, self.start, self.options = aligned, start, options
+        self.fix_sigma_m = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
+        scales = _scales(self.fix_sigma_m)
+        self.centre = np.log([s.centre for s in scales])
+        self.width = np.array([s.width for s in scales])
+        self.low = np.log([s.low for s in scales])
+        self.high = np.log([s.high for s in scales])
+        self.free = np.ones(self.centre.size, dtype=bool)
+        if not options.with_offset:
+            self.free[[1, 2]] = False
+        self.others = _other_scales(aligned, start)
+
+    def noise(self, logs: Floats) -> Noise:
+        return Noise(*(float(v) for v in np.exp(logs)), other_fix_scale=self.others)
+
+    def hills(self) -> list[Floats]:
+        """Starting points: who may carry the blame for what white noise does not explain."""
+        white = _white_level_m(self.aligned, self.start, self.aligned.fix_leading)
+        white = max(white if np.isfinite(white) else self.fix_sigma_m, 1e-4)
+        points = []
+        for coloured in (1.0, 5.0, 25.0):
+            for slip in (0.002, 0.01):
+                point = self.centre.copy()
+                point[3] = np.log(white / self.fix_sigma_m)
+                point[4] = np.log(coloured * white)
+                point[6] = np.log(slip)
+                points.append(np.clip(point, self.low, self.high))
+        return points
+
+    def problem(self, timeline: Timeline, logs: Floats) -> RunProblem:
+        return RunProblem(self.aligned, timeline, self.start, self.noise(logs), self.options)
+
+    def cost(self, problem: RunProblem, logs: Floats, constants: Constants, clear: tuple[Floats, Floats]) -> float:
         found = problem.begun(constants, constants, clear).finish()
-        value = found.nll_heading + found.nll_fix + 0.5 * float((((logs - centre) / width)[free] ** 2).sum())
+        prior = 0.5 * float((((logs - self.centre) / self.width)[self.free] ** 2).sum())
+        value = found.nll_heading + found.nll_fix + prior
         return value if np.isfinite(value) else 1e12
 
-    best = centre.copy()
-    best[free] = minimize(
-        cost,
-        first[free],
-        method="L-BFGS-B",
-        bounds=[(np.log(s.low), np.log(s.high)) for s, on in zip(scales, free, strict=True) if on],
-        options={"eps": 0.02, "maxiter": 25, "ftol": 1e-6},
-    ).x
-    return noise_at(best)
+    def settled(self, timeline: Timeline, logs: Floats, constants: Constants) -> tuple[float, Constants]:
+        """Cost at given noise with the constants fitted to it, and these."""
+        problem = self.problem(timeline, logs)
+        mode, _ = iterate(problem, constants, max_rounds=2)
+        fitted = Constants(*(float(v) for v in mode[:3]))
+        return self.cost(problem, logs, fitted, problem.clear_steps(fitted)), fitted
+
+    def climb(
+        self, timeline: Timeline, logs: Floats, constants: Constants, method: str, options: dict[str, float]
+    ) -> Floats:
+        """The most likely levels from a starting point on, the constants' linearisation fixed."""
+        clear = self.problem(timeline, logs).clear_steps(constants)
+
+        def cost(part: Floats) -> float:
+            at = logs.copy()
+            at[self.free] = part
+            return self.cost(self.problem(timeline, at), at, constants, clear)
+
+        limits = list(zip(self.low[self.free], self.high[self.free], strict=True))
+        found = minimize(cost, logs[self.free], method=method, bounds=limits, options=options)
+        best = logs.copy()
+        best[self.free] = found.x
+        return best
 
 
 def _white_level_m(aligned: Aligned, start: Start, rows: np.ndarray) -> float:

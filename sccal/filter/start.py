@@ -100,13 +100,15 @@ def find_start(aligned: Aligned) -> Start:
         )
     offset = -float(np.angle(fit.alpha))
     yaw_first = float(np.interp(first, aligned.heading_t_s, aligned.yaw_rad))
+    used_from = aligned.fix_t_s[rows[0]]
+    driven_before = float(np.abs(np.diff(travel[aligned.wheel_t_s <= used_from])).sum())
     position = fit.alpha * (path[0] - fit.path_mean) + fit.fix_mean
     return Start(
         east_m=float(position.real),
         north_m=float(position.imag),
         yaw_rad=yaw_first - offset,
         offset_rad=float(np.arctan2(np.sin(offset), np.cos(offset))),
-        sigma_position_m=float(3.0 * fit.rms_m + np.median(sigma) + 0.1),
+        sigma_position_m=float(3.0 * fit.rms_m + np.median(sigma) + 0.1 + 0.05 * driven_before),
         sigma_yaw_rad=float(
             np.sqrt(HEADING_FLOOR_RAD**2 + (2 * fit.sigma_angle) ** 2 + min(fit.rms_m / fit.spread_m, 1.0) ** 2)
         ),

@@ -10,7 +10,7 @@ Units: "counts" are the file's own (ticks or radians); ``counts_per_m`` turns th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +23,7 @@ _STRETCH_S = 0.3
 _ACCELERATION_MPS2 = 5.0
 _SPEED_MARGIN_MPS = 0.5
 _CHAIN_MEMORY_S = 10.0
+_CHAINS_AT_ONCE = 8
 _STALE_S = 2.0
 _SHORT_ROWS = 5
 _SHORT_S = 1.0
@@ -114,6 +115,37 @@ def repair(t_s: Floats, counts: Floats, scale: Scale, bits: int | None) -> Repai
         ValueError: more than half of the steps make no sense at any speed up to 60 m/s.
     """
     modulus = None if bits is None else 2.0**bits
+    zeros = _zeros_out_of_place(counts, modulus, scale)
+    if zeros.size == 0:
+        return _repaired(t_s, counts, scale, modulus)
+    rows = np.delete(np.arange(t_s.size), zeros)
+    repaired = _repaired(t_s[rows], counts[rows], scale, modulus)
+    keep = np.zeros(t_s.size, dtype=np.bool_)
+    keep[rows] = repaired.keep
+    return replace(repaired, keep=keep, stale=rows[repaired.stale])
+
+
+def _zeros_out_of_place(counts: Floats, modulus: float | None, scale: Scale) -> Ints:
+    """Rows of a few (0, 0) between counts that did not pass zero: a driver without news, whatever the speed."""
+    zero = (counts[:, 0] == 0) & (counts[:, 1] == 0)
+    edges = np.flatnonzero(np.diff(zero)) + 1
+    lost: list[int] = []
+    for first, stop in pairwise(edges.tolist()):
+        if not zero[first] or stop - first > _SHORT_ROWS:
+            continue
+        travel, offset = counts[stop] - counts[first - 1], -counts[first - 1]
+        if modulus is not None:
+            travel = travel - modulus * np.round(travel / modulus)
+            offset = offset - modulus * np.round(offset / modulus)
+        slack = 3 * scale.quantum
+        passed = (offset >= np.minimum(travel, 0) - slack) & (offset <= np.maximum(travel, 0) + slack)
+        started_anew = np.abs(travel - offset) < 0.25 * np.abs(offset)
+        if not (passed | started_anew).all():
+            lost.extend(range(first, stop))
+    return np.array(lost, dtype=np.int64)
+
+
+def _repaired(t_s: Floats, counts: Floats, scale: Scale, modulus: float | None) -> Repair:
     dt_s = np.diff(t_s)
     steps = _unwrapped_steps(counts, modulus)
     motion = _motion(t_s, steps, scale)
@@ -239,11 +271,15 @@ class _Rows:
     def possible(self, a: int, b: int) -> bool:
         """Whether the machine could have moved so at its highest speed; a fresh start from zero is taken as a reset."""
         top, usual_dt_s = self.motion.top, self.motion.usual_dt_s
-        near_zero = top * usual_dt_s + 3 * self.scale.quantum
-        if (np.abs(self.counts[b]) <= near_zero).all() and (np.abs(self.counts[a]) > near_zero).all():
+        if self.restarts(a, b):
             return False
         reach = top * (self.t_s[b] - self.t_s[a] + max(self.motion.allowance_s, 1.5 * usual_dt_s, 0.05))
         return bool((np.abs(self.travel(a, b)) <= reach + 3 * self.scale.quantum).all())
+
+    def restarts(self, a: int, b: int) -> bool:
+        """Whether row b stands near zero and row a does not."""
+        near_zero = self.motion.top * self.motion.usual_dt_s + 3 * self.scale.quantum
+        return bool((np.abs(self.counts[b]) <= near_zero).all() and (np.abs(self.counts[a]) > near_zero).all())
 
     def still_since(self, first: int, last: int) -> int:
         """The earliest row, not before ``first``, from which the counts are those of row ``last``."""
@@ -309,7 +345,7 @@ def _chained(rows: _Rows, cuts: Ints, verdict: _Verdict) -> list[_Chain]:
     chains: list[_Chain] = []
     recent: list[_Chain] = []
     for start, stop in pairwise(bounds):
-        recent = [c for c in recent if c is recent[0] or t_s[start] - t_s[c.last] <= _CHAIN_MEMORY_S][:8]
+        recent = _candidates(recent, start, rows)
         host = next((c for c in recent if rows.follows(c.last, start)), None)
         if host is None and stop - start >= _SHORT_ROWS:
             settled = [c for c in recent if c.rows >= _SHORT_ROWS]
@@ -326,11 +362,27 @@ def _chained(rows: _Rows, cuts: Ints, verdict: _Verdict) -> list[_Chain]:
     return chains
 
 
+def _candidates(recent: list[_Chain], start: int, rows: _Rows) -> list[_Chain]:
+    """The chains, latest first, that row ``start`` may continue: none from before a counter that has counted since."""
+    t_s = rows.t_s
+    candidates: list[_Chain] = []
+    for chain in recent[:_CHAINS_AT_ONCE]:
+        if candidates and t_s[start] - t_s[chain.last] > _CHAIN_MEMORY_S:
+            continue
+        candidates.append(chain)
+        first, last = chain.first, chain.last
+        if t_s[last] - t_s[first] > _SHORT_S and (rows.counts[last] != rows.counts[first]).any():
+            break
+    return candidates
+
+
 def _caught_up(chain: _Chain, start: int, rows: _Rows, verdict: _Verdict) -> bool:
     """Whether row ``start`` continues the chain from before it lagged; if so, the rows between are stale.
 
     The counts lagged since they stood still last, or since the chain's last odd steps.
     """
+    if rows.restarts(chain.last, start):
+        return False
     begin, stop = chain.segments[-1]
     halt = rows.still_since(begin, stop - 1) + 1
     if begin + 1 < halt < stop:
@@ -349,12 +401,13 @@ def _caught_up(chain: _Chain, start: int, rows: _Rows, verdict: _Verdict) -> boo
 
 
 def _negligible(chain: _Chain, rows: _Rows) -> bool:
-    """Too short to be the counter's new life, or a value that never changes (a driver that is not up yet)."""
+    """Too short to be the counter's new life, or a value that never changes: at the start, zeros of a driver not up."""
     if chain.rows < _SHORT_ROWS:
         return True
     first, last = chain.first, chain.last
     constant = bool((rows.counts[first : last + 1] == rows.counts[first]).all())
-    return constant and (first == 0 or rows.t_s[last] - rows.t_s[first] <= _SHORT_S)
+    waiting = first == 0 and not rows.counts[first].any()
+    return constant and (waiting or rows.t_s[last] - rows.t_s[first] <= _SHORT_S)
 
 
 def _assembled(rows: _Rows, verdict: _Verdict) -> Repair:

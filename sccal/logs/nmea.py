@@ -133,23 +133,24 @@ def _midnights(
 
     The dates of a run in one go all give the same midnight; a date that holds for a few sentences only is nonsense.
     """
-    day = _days(timed)
-    status = timed.letter(2)
+    rows = np.flatnonzero(kinds_in(timed.kind, (b"RMC", b"ZDA")))
+    dating = timed.take(rows)
+    day = _days(dating)
     dated = np.isfinite(day)
-    valid_rmc = dated & (timed.kind == b"RMC") & (status == ord("A"))
-    zda = dated & (timed.kind == b"ZDA")
+    valid_rmc = dated & (dating.kind == b"RMC") & (dating.letter(2) == ord("A"))
+    zda = dated & (dating.kind == b"ZDA")
     preferred = valid_rmc if valid_rmc.any() else zda if zda.any() else dated
-    rows = np.flatnonzero(preferred)
+    rows, day = rows[preferred], day[preferred]
     if rows.size == 0:
         return np.zeros(tod_s.size), False
-    offset_s = np.round((day[rows] * _DAY_S + tod_s[rows] - running_s[rows]) / _DAY_S) * _DAY_S
+    offset_s = np.round((day * _DAY_S + tod_s[rows] - running_s[rows]) / _DAY_S) * _DAY_S
     values, which, counts = np.unique(offset_s, return_inverse=True, return_counts=True)
     if values.size > 1:
         rare = (counts < max(3.0, 0.05 * rows.size)) & (counts < counts.max())
         lost = rare[which]
         if lost.any():
             first = rows[lost][0]
-            wrong_date = np.datetime64(int(day[first]), "D")
+            wrong_date = np.datetime64(int(day[lost][0]), "D")
             what = f"dates that the others contradict ignored ({wrong_date})"
             notices.append(Notice(source, what, int(lost.sum()), f"line {timed.line[first]}", "warning"))
             rows, offset_s = rows[~lost], offset_s[~lost]
@@ -157,16 +158,16 @@ def _midnights(
     return offset_s[np.maximum(nearest, 0)], True
 
 
-def _days(timed: Sentences) -> Floats:
-    """(n) days since 1970-01-01 stated by RMC and ZDA, NaN for other sentences and impossible dates."""
-    rmc, zda = timed.kind == b"RMC", timed.kind == b"ZDA"
-    packed = timed.number(9)
+def _days(dating: Sentences) -> Floats:
+    """(n) days since 1970-01-01 stated by RMC and ZDA, NaN for impossible dates."""
+    rmc = dating.kind == b"RMC"
+    packed = dating.number(9)
     two_digits = packed % 100
-    day = np.where(rmc, np.floor(packed / 10000), timed.number(2))
-    month = np.where(rmc, np.floor(packed / 100) % 100, timed.number(3))
-    year = np.where(rmc, two_digits + np.where(two_digits >= 80, 1900, 2000), timed.number(4))
+    day = np.where(rmc, np.floor(packed / 10000), dating.number(2))
+    month = np.where(rmc, np.floor(packed / 100) % 100, dating.number(3))
+    year = np.where(rmc, two_digits + np.where(two_digits >= 80, 1900, 2000), dating.number(4))
     whole = (day == np.floor(day)) & (month == np.floor(month)) & (year == np.floor(year))
-    good = (rmc | zda) & whole & (day >= 1) & (month >= 1) & (month <= 12) & (year >= 1970) & (year < 2200)
+    good = whole & (day >= 1) & (month >= 1) & (month <= 12) & (year >= 1970) & (year < 2200)
     months = np.where(good, (year - 1970) * 12 + month - 1, 0).astype(np.int64)
     first = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
     length = (months + 1).astype("datetime64[M]").astype("datetime64[D]").astype(np.int64) - first

@@ -44,11 +44,13 @@ class Sentences:
     host_t_s: Floats
     """Time before the first ``$`` of the line; NaN where there is none."""
     commas: Ints
-    """Places of all commas of the buffer (any length)."""
+    """Places of all commas of the buffer (any length), and its size at the end."""
+    first_comma: Ints
+    """Index into ``commas`` of each sentence's first."""
 
     def field_count(self) -> Ints:
         """Commas in each sentence."""
-        return np.searchsorted(self.commas, self.stop) - np.searchsorted(self.commas, self.start)
+        return np.searchsorted(self.commas, self.stop) - self.first_comma
 
     def take(self, rows: Ints) -> Sentences:
         """Only the sentences at the indices ``rows``."""
@@ -63,6 +65,7 @@ class Sentences:
             self.line[rows],
             self.host_t_s[rows],
             self.commas,
+            self.first_comma[rows],
         )
 
     def number(self, field: int) -> Floats:
@@ -79,11 +82,10 @@ class Sentences:
 
     def span(self, field: int) -> tuple[Ints, Ints]:
         """Where field ``field`` (from 1) begins and ends in the buffer; empty where the sentence has not that many."""
-        first = np.searchsorted(self.commas, self.start) + field - 1
-        padded = np.append(self.commas, [self.data.size, self.data.size])
-        last = padded.size - 1
-        begin = padded[np.minimum(first, last)] + 1
-        end = np.minimum(padded[np.minimum(first + 1, last)], self.stop)
+        last = self.commas.size - 1
+        comma = self.first_comma + (field - 1)
+        begin = self.commas[np.minimum(comma, last)] + 1
+        end = np.minimum(self.commas[np.minimum(comma + 1, last)], self.stop)
         begin = np.minimum(begin, self.stop)
         return begin, np.maximum(begin, end)
 
@@ -113,7 +115,7 @@ def find_sentences(raw: bytes) -> Sentences:
 
     breaks = np.flatnonzero(body == (ord("\n") if b"\n" in raw else ord("\r")))
     line_index = np.searchsorted(breaks, start)
-    commas = np.flatnonzero(body == ord(","))
+    commas = np.append(np.flatnonzero(body == ord(",")), size)
     return Sentences(
         data=data,
         start=start,
@@ -125,6 +127,7 @@ def find_sentences(raw: bytes) -> Sentences:
         line=line_index + 1,
         host_t_s=_host_times(data, start, line_index, breaks),
         commas=commas,
+        first_comma=np.searchsorted(commas, start),
     )
 
 

@@ -306,3 +306,15 @@ def test_any_counts_give_a_sound_stream_or_a_known_error(
     assert np.isfinite(stream.left_rad).all()
     assert np.isfinite(stream.right_rad).all()
     assert (np.diff(stream.t_s) > 0).all()
+
+
+def test_zeros_near_a_wrap_are_bogus_even_where_the_step_would_be_possible(tmp_path: Path) -> None:
+    t_s, ticks = drive(20.0)
+    values = wrapped(ticks, 16, False, 0.0)
+    moving = np.abs(np.diff(ticks, axis=0)).min(axis=1, initial=np.inf) > 1000
+    close = ((values > 1500) & (values < 6000)).all(axis=1)
+    bogus = int(np.flatnonzero(close[1:-1] & moving[1:] & moving[:-1])[0]) + 1
+    values[bogus] = 0
+    _, notices, counts = read(tmp_path, t_s, values, 16)
+    assert (found(notices, "bogus").count, found(notices, "bogus").where) == (1, f"line {bogus + 2}")
+    np.testing.assert_allclose(counts, np.delete(ticks - ticks[0], bogus, axis=0), atol=1e-3)
