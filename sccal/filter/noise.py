@@ -9,6 +9,7 @@ filter itself over a stretch of the run, with wide log-normal priors that only m
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.optimize import minimize
@@ -24,6 +25,8 @@ from sccal.filter.start import Constants, Start, coarse_constants, path_along_ya
 STRETCH_S = 600.0
 WHEEL_RATE_HZ = 20.0
 FIX_RATE_HZ = 5.0
+MAX_CLIMBS = 3
+WORTH_ANOTHER_CLIMB = 5.0
 NORMAL_MAD = 1.4826
 DEFAULT_COLOURED_TAU_S = 30.0
 
@@ -65,12 +68,16 @@ def estimate_noise(aligned: Aligned, start: Start, options: FilterOptions, headi
     coarse = build_timeline(aligned, 0.01, 2.0, 1.0, stretch, 5.0)
     fine = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
 
-    constants = coarse_constants(aligned, start)
-    first = min(likelihood.hills(), key=lambda logs: likelihood.settled(coarse, logs, constants)[0])
-    _, constants = likelihood.settled(coarse, first, constants)
-    hill = likelihood.climb(coarse, first, constants, "Powell", {"maxfev": 400, "xtol": 0.1, "ftol": 1e-4})
-    _, constants = likelihood.settled(coarse, hill, constants)
-    top = likelihood.climb(fine, hill, constants, "L-BFGS-B", {"eps": 0.02, "maxfun": 130, "maxls": 8, "ftol": 1e-6})
+    rough = coarse_constants(aligned, start)
+    settled = [(likelihood.settled(coarse, hill, rough), hill) for hill in likelihood.hills()]
+    (cost, constants), level = min(settled, key=lambda one: one[0][0])
+    for _ in range(MAX_CLIMBS):
+        level = likelihood.climb(coarse, level, constants, "Powell", {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4})
+        before = cost
+        cost, constants = likelihood.settled(coarse, level, constants)
+        if cost > before - WORTH_ANOTHER_CLIMB:
+            break
+    top = likelihood.climb(fine, level, constants, "L-BFGS-B", {"eps": 0.02, "maxiter": 5, "maxls": 5, "ftol": 1e-6})
     return likelihood.noise(top)
 
 
@@ -98,13 +105,13 @@ class _Likelihood:
         white = _white_level_m(self.aligned, self.start, self.aligned.fix_leading)
         white = max(white if np.isfinite(white) else self.fix_sigma_m, 1e-4)
         points = []
-        for coloured in (1.0, 5.0, 25.0):
-            for slip in (0.002, 0.01):
-                point = self.centre.copy()
-                point[3] = np.log(white / self.fix_sigma_m)
-                point[4] = np.log(coloured * white)
-                point[6] = np.log(slip)
-                points.append(np.clip(point, self.low, self.high))
+        for coloured, slip, heading_rad in product((1.0, 5.0, 25.0), (0.002, 0.01), np.radians((0.5, 5.0))):
+            point = self.centre.copy()
+            point[1] = np.log(heading_rad)
+            point[3] = np.log(white / self.fix_sigma_m)
+            point[4] = np.log(coloured * white)
+            point[6] = np.log(slip)
+            points.append(np.clip(point, self.low, self.high))
         return points
 
     def problem(self, timeline: Timeline, logs: Floats) -> RunProblem:
@@ -120,8 +127,10 @@ class _Likelihood:
         """Cost at given noise with the constants fitted to it, and these."""
         problem = self.problem(timeline, logs)
         mode, _ = iterate(problem, constants, max_rounds=2)
-        fitted = Constants(*(float(v) for v in mode[:3]))
-        return self.cost(problem, logs, fitted, problem.clear_steps(fitted)), fitted
+        candidates = (constants, Constants(*(float(v) for v in mode[:3])))
+        costs = [self.cost(problem, logs, one, problem.clear_steps(one)) for one in candidates]
+        better = int(np.argmin(costs))
+        return costs[better], candidates[better]
 
     def climb(
         self, timeline: Timeline, logs: Floats, constants: Constants, method: str, options: dict[str, float]
