@@ -35,8 +35,9 @@ clean: ## remove the environment, caches and results
 $(VENV)/.ready: pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv 2>/dev/null \
-	  && $(BIN)/uv pip install --quiet --python $(BIN)/python -e . \
+	  && $(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python -e . \
 	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@$(BIN)/python -m compileall -q sccal || true
 	@touch $@
 
 $(VENV)/.ready-dev: $(VENV)/.ready pyproject.toml

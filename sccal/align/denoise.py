@@ -52,35 +52,31 @@ def _denoise(steps: Floats, travelled: Floats) -> Floats:
     if moving.sum() < 8:
         return steps
     level = NORMAL_MAD * float(np.median(np.abs(scaled[moving]) / np.sqrt(base[moving])))
-    variance = level**2 * travelled
     size = 1 << int(np.ceil(np.log2(steps.size)))
-    padded = np.zeros(size)
-    padded_variance = np.zeros(size)
-    total = np.zeros(steps.size)
-    shifts = [(k * size) // SHIFTS + k for k in range(SHIFTS)]
-    for shift in shifts:
-        padded[: steps.size], padded[steps.size :] = steps, 0.0
-        padded_variance[: steps.size], padded_variance[steps.size :] = variance, 0.0
-        kept = _haar_threshold(np.roll(padded, shift), np.roll(padded_variance, shift))
-        total += np.roll(kept, -shift)[: steps.size]
-    return total / len(shifts)
+    shifts = (np.arange(SHIFTS) * size) // SHIFTS + np.arange(SHIFTS)
+    rows = (np.arange(size)[None, :] - shifts[:, None]) % size
+    padded = np.zeros((2, size))
+    padded[0, : steps.size] = steps
+    padded[1, : steps.size] = level**2 * travelled
+    kept = _haar_threshold(padded[0][rows], padded[1][rows])
+    back = (np.arange(steps.size)[None, :] + shifts[:, None]) % size
+    return np.asarray(np.take_along_axis(kept, back, axis=1).mean(axis=0))
 
 
 def _haar_threshold(values: Floats, variance: Floats) -> Floats:
-    """Hard threshold of the orthonormal Haar coefficients of values (2^k,), given their noise variance (2^k,)."""
+    """Hard threshold of the orthonormal Haar coefficients of each row (s, 2^k), given their noise variance (s, 2^k)."""
     details: list[Floats] = []
     smooth, smooth_variance = values, variance
-    while smooth.size > 1:
-        detail = (smooth[::2] - smooth[1::2]) / np.sqrt(2.0)
-        smooth = (smooth[::2] + smooth[1::2]) / np.sqrt(2.0)
-        smooth_variance = 0.5 * (smooth_variance[::2] + smooth_variance[1::2])
-        detail[np.abs(detail) < THRESHOLD_SIGMAS * np.sqrt(smooth_variance)] = 0.0
+    while smooth.shape[1] > 1:
+        detail = (smooth[:, ::2] - smooth[:, 1::2]) / np.sqrt(2.0)
+        smooth = (smooth[:, ::2] + smooth[:, 1::2]) / np.sqrt(2.0)
+        smooth_variance = 0.5 * (smooth_variance[:, ::2] + smooth_variance[:, 1::2])
+        detail[detail**2 < THRESHOLD_SIGMAS**2 * smooth_variance] = 0.0
         details.append(detail)
-    if smooth[0] ** 2 < THRESHOLD_SIGMAS**2 * smooth_variance[0]:
-        smooth = np.zeros(1)
+    smooth = np.where(smooth**2 < THRESHOLD_SIGMAS**2 * smooth_variance, 0.0, smooth)
     for detail in reversed(details):
-        finer = np.empty(2 * smooth.size)
-        finer[::2] = (smooth + detail) / np.sqrt(2.0)
-        finer[1::2] = (smooth - detail) / np.sqrt(2.0)
+        finer = np.empty((detail.shape[0], 2 * detail.shape[1]))
+        finer[:, ::2] = (smooth + detail) / np.sqrt(2.0)
+        finer[:, 1::2] = (smooth - detail) / np.sqrt(2.0)
         smooth = finer
     return smooth

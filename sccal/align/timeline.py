@@ -88,7 +88,12 @@ def build_timeline(
 
 def clear_steps(aligned: Aligned, timeline: Timeline, right_over_left: float) -> tuple[Floats, Floats]:
     """Right and left wheel angle from event to event (n,), without what is only slip (see denoise)."""
-    grid, right, left = denoised_angles(aligned.wheel_t_s, aligned.right_rad, aligned.left_rad, right_over_left)
+    first = max(int(np.searchsorted(aligned.wheel_t_s, timeline.t_s[0])) - 1, 0)
+    last = int(np.searchsorted(aligned.wheel_t_s, timeline.t_s[-1])) + 1
+    part = slice(first, last)
+    grid, right, left = denoised_angles(
+        aligned.wheel_t_s[part], aligned.right_rad[part], aligned.left_rad[part], right_over_left
+    )
     return _steps(timeline.t_s, grid, right), _steps(timeline.t_s, grid, left)
 
 
