@@ -84,7 +84,9 @@ def calibrate_paths(
     taken: set[str] = set()
     for members in of_vehicle.values():
         vehicle = combine([one for one, _ in members], [problem for _, problem in members])
-        stem = "vehicle" if len(of_vehicle) == 1 else _free_stem(f"vehicle-{_as_file_name(vehicle.vehicle.name)}", taken)
+        stem = (
+            "vehicle" if len(of_vehicle) == 1 else _free_stem(f"vehicle-{_as_file_name(vehicle.vehicle.name)}", taken)
+        )
         write_vehicle(vehicle, out, stem)
         batch.vehicles.append((vehicle, out / f"{stem}.json"))
     return batch

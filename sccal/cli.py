@@ -82,9 +82,7 @@ def calibrate(
     track_prior: Annotated[float, typer.Option(help="Prior sigma of the track width, % of nominal.", min=0.01)] = 30.0,
     radius_walk: Annotated[float, typer.Option(help="Random walk of each radius, ppm per √s.", min=0.0)] = 1.0,
     track_walk: Annotated[float, typer.Option(help="Random walk of the track, ppm per √s.", min=0.0)] = 3.0,
-    offset_walk: Annotated[
-        float, typer.Option(help="Random walk of the heading offset, deg per √s.", min=0.0)
-    ] = 0.002,
+    offset_walk: Annotated[float, typer.Option(help="Random walk of the heading offset, deg per √s.", min=0.0)] = 0.002,
     gate: Annotated[float, typer.Option(help="Reject measurements further off than this, sigmas.", min=1.0)] = 5.0,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""

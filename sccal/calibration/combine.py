@@ -96,7 +96,8 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         outage=summarise(
             [window for run in runs for window in run.outage.windows],
             runs[0].outage.window_s,
-            runs[0].outage.how.split(" from ")[0] + " in every run; each judged by what its own run had learnt before it",
+            runs[0].outage.how.split(" from ")[0]
+            + " in every run; each judged by what its own run had learnt before it",
         ),
         consistency_chi2_per_dof=chi2_per_dof,
         notices=tuple(notices),

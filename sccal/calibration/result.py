@@ -14,7 +14,23 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.filter.forward import Noise
 from sccal.logs.streams import Notice, Vehicle
 
-__all__ = ["Calibration", "Clock", "Drive", "Estimate", "Fit", "Fixes", "History", "Noise", "Outage", "OutageWindow", "Parameters", "Residuals", "Status", "Trajectory", "VehicleCalibration"]
+__all__ = [
+    "Calibration",
+    "Clock",
+    "Drive",
+    "Estimate",
+    "Fit",
+    "Fixes",
+    "History",
+    "Noise",
+    "Outage",
+    "OutageWindow",
+    "Parameters",
+    "Residuals",
+    "Status",
+    "Trajectory",
+    "VehicleCalibration",
+]
 
 Status = Literal["estimated", "unobserved", "at_bound", "held"]
 

@@ -361,7 +361,20 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
         right_clear = events.right_clear_rad[i]
         left_clear = events.left_clear_rad[i]
         if right != 0.0 or left != 0.0 or right_clear != 0.0 or left_clear != 0.0 or events.loose_m2[i] > 0.0:
-            _move(x, P, work, right, left, right_clear, left_clear, events.loose_m2[i], i, columns, model.slip2, model.linear)
+            _move(
+                x,
+                P,
+                work,
+                right,
+                left,
+                right_clear,
+                left_clear,
+                events.loose_m2[i],
+                i,
+                columns,
+                model.slip2,
+                model.linear,
+            )
 
         h = events.heading_row[i]
         if h >= 0:

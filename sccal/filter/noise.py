@@ -8,6 +8,9 @@ filter itself over a stretch of the run, with wide log-normal priors that only m
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -27,6 +30,8 @@ WHEEL_RATE_HZ = 20.0
 FIX_RATE_HZ = 5.0
 MAX_CLIMBS = 3
 WORTH_ANOTHER_CLIMB = 5.0
+SETTLED_HILLS = 4
+DIFFERENCE = 0.02
 NORMAL_MAD = 1.4826
 DEFAULT_COLOURED_TAU_S = 30.0
 
@@ -69,16 +74,16 @@ def estimate_noise(aligned: Aligned, start: Start, options: FilterOptions, headi
     fine = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
 
     rough = coarse_constants(aligned, start)
-    settled = [(likelihood.settled(coarse, hill, rough), hill) for hill in likelihood.hills()]
+    promising = likelihood.best_of(coarse, likelihood.hills(), rough)[:SETTLED_HILLS]
+    settled = [(likelihood.settled(coarse, hill, rough), hill) for hill in promising]
     (cost, constants), level = min(settled, key=lambda one: one[0][0])
     for _ in range(MAX_CLIMBS):
-        level = likelihood.climb(coarse, level, constants, "Powell", {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4})
+        level = likelihood.climb(coarse, level, constants)
         before = cost
         cost, constants = likelihood.settled(coarse, level, constants)
         if cost > before - WORTH_ANOTHER_CLIMB:
             break
-    top = likelihood.climb(fine, level, constants, "L-BFGS-B", {"eps": 0.02, "maxiter": 5, "maxls": 5, "ftol": 1e-6})
-    return likelihood.noise(top)
+    return likelihood.noise(likelihood.climb_smoothly(fine, level, constants))
 
 
 class _Likelihood:
@@ -132,22 +137,50 @@ class _Likelihood:
         better = int(np.argmin(costs))
         return costs[better], candidates[better]
 
-    def climb(
-        self, timeline: Timeline, logs: Floats, constants: Constants, method: str, options: dict[str, float]
-    ) -> Floats:
-        """The most likely levels from a starting point on, the constants' linearisation fixed."""
+    def best_of(self, timeline: Timeline, points: list[Floats], constants: Constants) -> list[Floats]:
+        """The points in order of their cost at the given constants."""
+        cost = self._cost_of_free(timeline, points[0], constants)
+        return sorted(points, key=lambda point: cost(point[self.free]))
+
+    def climb(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
+        """The most likely levels from a far starting point, the constants' linearisation fixed (Powell)."""
+        cost = self._cost_of_free(timeline, logs, constants)
+        options = {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4}
+        found = minimize(cost, logs[self.free], method="Powell", bounds=self._limits(), options=options)
+        return self._with_free(logs, found.x)
+
+    def climb_smoothly(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
+        """The same from a near one (L-BFGS-B). The kernel releases the GIL, so the differences share the cores."""
+        cost = self._cost_of_free(timeline, logs, constants)
+        with ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, 4)) as pool:
+
+            def cost_and_slope(part: Floats) -> tuple[float, Floats]:
+                points = [part, *(part + DIFFERENCE * unit for unit in np.eye(part.size))]
+                here, *beside = pool.map(cost, points)
+                return here, (np.array(beside) - here) / DIFFERENCE
+
+            options = {"maxiter": 5, "maxls": 5, "ftol": 1e-6}
+            found = minimize(
+                cost_and_slope, logs[self.free], jac=True, method="L-BFGS-B", bounds=self._limits(), options=options
+            )
+        return self._with_free(logs, found.x)
+
+    def _cost_of_free(self, timeline: Timeline, logs: Floats, constants: Constants) -> Callable[[Floats], float]:
         clear = self.problem(timeline, logs).clear_steps(constants)
 
         def cost(part: Floats) -> float:
-            at = logs.copy()
-            at[self.free] = part
+            at = self._with_free(logs, part)
             return self.cost(self.problem(timeline, at), at, constants, clear)
 
-        limits = list(zip(self.low[self.free], self.high[self.free], strict=True))
-        found = minimize(cost, logs[self.free], method=method, bounds=limits, options=options)
-        best = logs.copy()
-        best[self.free] = found.x
-        return best
+        return cost
+
+    def _with_free(self, logs: Floats, part: Floats) -> Floats:
+        at = logs.copy()
+        at[self.free] = part
+        return at
+
+    def _limits(self) -> list[tuple[float, float]]:
+        return list(zip(self.low[self.free], self.high[self.free], strict=True))
 
 
 def _white_level_m(aligned: Aligned, start: Start, rows: np.ndarray) -> float:
