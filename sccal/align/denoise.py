@@ -1,9 +1,9 @@
 """The wheels' motion without the part that is only slip: what the constants' sensitivities are computed from.
 
 A robot held on its path by a controller moves smoothly; its wheels turn a little more here and less there, because
-they slip. A filter that takes every such wiggle of the wheels for a turn sees turns that the robot never made, concludes
-that turns by the wheels mean little, and grows a track that is too wide, with a sigma that is too small: the classical
-attenuation by errors in the regressor. On a straight line it would "measure" the track out of slip alone.
+they slip. A filter that takes every such wiggle of the wheels for a turn sees turns that the robot never made,
+concludes that turns by the wheels mean little, and grows a track that is too wide, with a sigma that is too small: the
+classical attenuation by errors in the regressor. On a straight line it would "measure" the track out of slip alone.
 
 Prediction keeps the raw wheel angles. Only the derivatives by R_r, R_l and L use the motion that stands out of the
 noise: sum and difference of the wheels' travel, thresholded in Haar wavelets averaged over shifts (Donoho and Johnstone

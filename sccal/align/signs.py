@@ -97,13 +97,13 @@ def _check_wheel_directions(aligned: Aligned, t_s: Floats, east_m: Floats, north
         return
     yaw = np.diff(np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad))
     turning = slope_through_origin(right + left, yaw)
-    wheel = "the left or the right wheel" if not turning.clear else ("left" if turning.value > 0 else "right")
-    column = "left_ticks or right_ticks" if not turning.clear else f"{wheel}_ticks"
+    who, column = "one wheel", "left_ticks or right_ticks"
+    if turning.clear:
+        side = "left" if turning.value > 0 else "right"
+        who, column = f"the {side} wheel", f"{side}_ticks"
     raise DataError(
-        f"encoder.csv: the {wheel} wheel seems to count backwards: over {displacement.size} stretches the fixes move by half "
-        f"the difference of the wheels' travel, not by half their sum; negate {column}".replace(
-            "the the left or the right wheel wheel seems", "one wheel seems"
-        )
+        f"encoder.csv: {who} seems to count backwards: over {displacement.size} stretches the fixes move by half the "
+        f"difference of the wheels' travel, not by half their sum; negate {column}"
     )
 
 

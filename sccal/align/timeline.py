@@ -12,7 +12,7 @@ import numpy as np
 
 from sccal.align.aligned import Aligned
 from sccal.align.denoise import denoised_angles
-from sccal.arrays import Floats
+from sccal.arrays import Floats, Ints, Rows
 
 LOOSE_FRACTION = 0.25
 LOOSE_FLOOR_M = 0.02
@@ -28,17 +28,17 @@ class Timeline:
     left_rad: Floats
     loose_m2: Floats
     """Extra variance of each wheel's travel since the event before (n,): gaps and counter resets."""
-    heading_row: np.ndarray
-    """(n,) int32 into Timeline.heading_index."""
-    fix_row: np.ndarray
-    out_row: np.ndarray
-    heading_index: np.ndarray
-    """(h,) int64: which of the aligned readings are used."""
-    fix_index: np.ndarray
+    heading_row: Rows
+    """(n,) into Timeline.heading_index."""
+    fix_row: Rows
+    out_row: Rows
+    heading_index: Ints
+    """(h,) which of the aligned readings are used."""
+    fix_index: Ints
     out_t_s: Floats
 
 
-def thin(t_s: Floats, rate_hz: float) -> np.ndarray:
+def thin(t_s: Floats, rate_hz: float) -> Ints:
     """Indices of the readings that keep at most the given rate (every k-th where the stream is regular)."""
     if t_s.size < 2 or not np.isfinite(rate_hz):
         return np.arange(t_s.size)
@@ -97,8 +97,8 @@ def clear_steps(aligned: Aligned, timeline: Timeline, right_over_left: float) ->
     return _steps(timeline.t_s, grid, right), _steps(timeline.t_s, grid, left)
 
 
-def _within(t_s: Floats, first: float, last: float, index: np.ndarray) -> np.ndarray:
-    return index[(t_s[index] >= first) & (t_s[index] <= last)]
+def _within(t_s: Floats, first: float, last: float, index: Ints) -> Ints:
+    return np.asarray(index[(t_s[index] >= first) & (t_s[index] <= last)])
 
 
 def _steps(t_s: Floats, sample_t_s: Floats, cumulative: Floats) -> Floats:
@@ -110,7 +110,7 @@ def _steps(t_s: Floats, sample_t_s: Floats, cumulative: Floats) -> Floats:
     return steps
 
 
-def _rows(t_s: Floats, some_t_s: Floats) -> np.ndarray:
+def _rows(t_s: Floats, some_t_s: Floats) -> Rows:
     """For every event the row of the measurement that stands at its time, or -1."""
     rows = np.full(t_s.size, -1, dtype=np.int32)
     rows[np.searchsorted(t_s, some_t_s)] = np.arange(some_t_s.size, dtype=np.int32)

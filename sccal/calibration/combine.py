@@ -68,7 +68,7 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         shared = Constants(*(float(v) for v in at))
         likelihoods = [RunLikelihood.of(problem, shared) for problem in problems]
         precision = prior + sum(one.precision for one in likelihoods)
-        covariance = np.linalg.inv(precision)
+        covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
         mode = np.clip(covariance @ (prior @ nominal + sum(one.vector for one in likelihoods)), lower, upper)
         moved = np.abs(mode - at) / np.sqrt(np.diag(covariance))
         at = mode
@@ -163,8 +163,8 @@ def _combined_offset(runs: Sequence[Calibration]) -> tuple[Estimate, list[Notice
     spread = float(np.ptp(apart))
     if spread > OFFSET_OF_THE_RUN_RAD:
         reason = (
-            f"the heading offset differs by up to {np.degrees(spread):.0f}° between the runs: it belongs to each run (an "
-            "AHRS whose zero is set at power-up?), see the runs' own values"
+            f"the heading offset differs by up to {np.degrees(spread):.0f}° between the runs: it belongs to each run "
+            "(an AHRS whose zero is set at power-up?), see the runs' own values"
         )
         return Estimate(value, max(sigma, spread), "unobserved", reason), [Notice("vehicle", reason, 1, "", "warning")]
     return Estimate(value, sigma, "estimated"), []

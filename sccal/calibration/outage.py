@@ -18,8 +18,8 @@ SETTLING_S = 20.0
 MIN_FIXES = 3
 MIN_COVERED = 0.8
 HOW = (
-    "windows laid end to end from {first:.0f} s after the first motion; in each, the filter knows wheels and heading, and "
-    "of the fixes only those before the window"
+    "windows laid end to end from {first:.0f} s after the first motion; in each, the filter knows wheels and heading, "
+    "and of the fixes only those before the window"
 )
 
 

@@ -30,6 +30,7 @@ from sccal.logs.streams import Notice, Run
 
 SETTLED_S = 20.0
 STANDING_MPS = 0.02
+MANY_REJECTED = 0.05
 
 
 def prepare(run: Run, options: CalibrationOptions) -> RunProblem:
@@ -141,22 +142,21 @@ def describe_drive(aligned: Aligned, radius_m: float) -> Drive:
 def _doubts(problem: RunProblem, found: ForwardPass) -> list[Notice]:
     """What the filter itself noticed."""
     notices = []
-    rejected = int((~found.fix_accepted).sum())
-    if rejected:
-        severity = "warning" if rejected > 0.05 * found.fix_accepted.size else "info"
-        notices.append(Notice("filter", "fixes rejected as outliers", rejected, "", severity))  # type: ignore[arg-type]
-    rejected = int((~found.heading_accepted).sum())
-    if rejected:
-        severity = "warning" if rejected > 0.05 * found.heading_accepted.size else "info"
-        notices.append(Notice("filter", "heading readings rejected as outliers", rejected, "", severity))  # type: ignore[arg-type]
+    for accepted, what in ((found.fix_accepted, "fixes"), (found.heading_accepted, "heading readings")):
+        rejected = int((~accepted).sum())
+        if rejected:
+            many = rejected > MANY_REJECTED * accepted.size
+            notices.append(
+                Notice("filter", f"{what} rejected as outliers", rejected, "", "warning" if many else "info")
+            )
     if found.recoveries:
         what = "times the measurements left the prediction for good, and the filter was opened up again"
         notices.append(Notice("filter", what, found.recoveries, "", "warning"))
     scale = problem.start.wheel_scale
     if abs(scale - 1.0) > ODD_SCALE:
         what = (
-            f"sign that ticks_per_rev or wheel_radius_m in vehicle.toml is wrong: at the start the fixes move {scale:.2f} "
-            "times as far as the wheels"
+            f"sign that ticks_per_rev or wheel_radius_m is wrong: at the start the fixes move {scale:.2f} times as far "
+            "as the wheels"
         )
         notices.append(Notice("vehicle.toml", what, 1, "", "warning"))
     return notices

@@ -40,7 +40,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sccal.arrays import Floats
+from sccal.arrays import Bools, Floats, Rows
 from sccal.filter.compiled import compiled
 
 X, Y, THETA, RADIUS_RIGHT, RADIUS_LEFT, TRACK, OFFSET, HEADING_BIAS, EAST_BIAS, NORTH_BIAS = range(10)
@@ -69,9 +69,9 @@ class Events(NamedTuple):
     right_clear_rad: Floats  # (n,) the same without slip: for the derivatives by R_r, R_l, L
     left_clear_rad: Floats  # (n,)
     loose_m2: Floats  # (n,) extra variance of each wheel's travel, m²
-    heading_row: np.ndarray  # (n,) int32, row of the heading reading here, or -1
-    fix_row: np.ndarray  # (n,) int32
-    out_row: np.ndarray  # (n,) int32, row of the output to fill here, or -1
+    heading_row: Rows  # (n,) int32, row of the heading reading here, or -1
+    fix_row: Rows  # (n,) int32
+    out_row: Rows  # (n,) int32, row of the output to fill here, or -1
     yaw_rad: Floats  # (h,) AHRS reading turned into enu
     yaw_var_rad2: Floats  # (h,) white part
     fix_east_m: Floats  # (f,)
@@ -85,13 +85,13 @@ class Columns(NamedTuple):
     """Effect columns by the room they act in; ``param`` counts from 0 and adds BASE_STATES to give the state."""
 
     motion: Floats  # (n, km), rows as Events.t_s
-    motion_port: np.ndarray  # (km,) int32
-    motion_param: np.ndarray  # (km,) int32
+    motion_port: Rows  # (km,) int32
+    motion_param: Rows  # (km,) int32
     heading: Floats  # (h, kh), rad per unit of the parameter
-    heading_param: np.ndarray  # (kh,) int32
+    heading_param: Rows  # (kh,) int32
     fix: Floats  # (f, kf)
-    fix_port: np.ndarray  # (kf,) int32
-    fix_param: np.ndarray  # (kf,) int32
+    fix_port: Rows  # (kf,) int32
+    fix_param: Rows  # (kf,) int32
 
 
 class Model(NamedTuple):
@@ -121,22 +121,35 @@ class Output(NamedTuple):
     sigma: Floats  # (m, REPORTED_STATES)
     heading_nu: Floats  # (h,) rad, NaN where not reached
     heading_var: Floats  # (h,) innovation variance S
-    heading_ok: np.ndarray  # (h,) bool, accepted
+    heading_ok: Bools  # (h,) bool, accepted
     fix_nu: Floats  # (f, 2) m
     fix_var: Floats  # (f, 3) S_ee, S_nn, S_en
-    fix_ok: np.ndarray  # (f,) bool
+    fix_ok: Bools  # (f,) bool
     antenna: Floats  # (f, 2) m, predicted antenna (without the fix-error states)
     total: Floats  # (2,) negative log-likelihood: heading, fixes
 
 
 @compiled
-def wrap_angle(angle):  # type: ignore[no-untyped-def]
+def wrap_angle(angle: float) -> float:
     """Angle in [−π, π)."""
     return angle - TWO_PI * math.floor((angle + math.pi) / TWO_PI)
 
 
 @compiled
-def _move(x, P, work, right, left, right_clear, left_clear, loose, row, columns, slip2, linear):  # type: ignore[no-untyped-def]
+def _move(
+    x: Floats,
+    P: Floats,
+    work: Floats,
+    right: float,
+    left: float,
+    right_clear: float,
+    left_clear: float,
+    loose: float,
+    row: int,
+    columns: Columns,
+    slip2: float,
+    linear: Floats,
+) -> None:
     """Predict state and covariance through one step of the wheels."""
     n = x.shape[0]
     gs, gt, gd, S, T, D = work[0], work[1], work[2], work[3], work[4], work[5]
@@ -198,7 +211,8 @@ def _move(x, P, work, right, left, right_clear, left_clear, loose, row, columns,
     gs4 = 0.5 * left_clear
     gt3 = right_clear * inv_at_track
     gt4 = -left_clear * inv_at_track
-    gt5 = -(at_right * right_clear - at_left * left_clear) * inv_at_track * inv_at_track
+    effects = (along_right - x[3] * right) - (along_left - x[4] * left)
+    gt5 = -(at_right * right_clear - at_left * left_clear + effects) * inv_at_track * inv_at_track
 
     for q in range(n):
         S[q] = gs3 * P[3, q] + gs4 * P[4, q]
@@ -272,7 +286,7 @@ def _move(x, P, work, right, left, right_clear, left_clear, loose, row, columns,
 
 
 @compiled
-def _decay(x, P, state, factor, stationary_var):  # type: ignore[no-untyped-def]
+def _decay(x: Floats, P: Floats, state: int, factor: float, stationary_var: float) -> None:
     """First-order Gauss-Markov step of one state: x ← f x, variance towards the stationary one."""
     n = x.shape[0]
     x[state] *= factor
@@ -284,7 +298,7 @@ def _decay(x, P, state, factor, stationary_var):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _downdate(P, v, inv_s):  # type: ignore[no-untyped-def]
+def _downdate(P: Floats, v: Floats, inv_s: float) -> None:
     """P ← P − v vᵀ/S, symmetric to the last bit."""
     n = v.shape[0]
     for i in range(n):
@@ -294,7 +308,7 @@ def _downdate(P, v, inv_s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _clamp(x, lower, upper):  # type: ignore[no-untyped-def]
+def _clamp(x: Floats, lower: Floats, upper: Floats) -> None:
     for k in range(3):
         if x[3 + k] < lower[k]:
             x[3 + k] = lower[k]
@@ -303,7 +317,7 @@ def _clamp(x, lower, upper):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _open_position(x, P, nu_e, nu_n, level, use_offset):  # type: ignore[no-untyped-def]
+def _open_position(x: Floats, P: Floats, nu_e: float, nu_n: float, level: float, use_offset: bool) -> None:
     """The way back from a lock-out: forget the position, and step by step what else may have been wrong.
 
     Level 1 forgets the position; level 2 the heading too, together with the opposite change of the offset, so that
@@ -330,7 +344,18 @@ def _open_position(x, P, nu_e, nu_n, level, use_offset):  # type: ignore[no-unty
 
 
 @compiled
-def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out):  # type: ignore[no-untyped-def]
+def forward(
+    events: Events,
+    columns: Columns,
+    model: Model,
+    x: Floats,
+    P: Floats,
+    memory: Floats,
+    first: int,
+    last: int,
+    fixes_teach: bool,
+    out: Output,
+) -> None:
     """Run events first … last−1; x (n,), P (n, n) and memory are changed in place, so a pass can be continued.
 
     With ``fixes_teach`` false the fixes are predicted and compared, but teach the filter nothing (an outage).
@@ -360,7 +385,8 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
         left = events.left_rad[i]
         right_clear = events.right_clear_rad[i]
         left_clear = events.left_clear_rad[i]
-        if right != 0.0 or left != 0.0 or right_clear != 0.0 or left_clear != 0.0 or events.loose_m2[i] > 0.0:
+        standing = right == 0.0 and left == 0.0 and right_clear == 0.0 and left_clear == 0.0
+        if not standing or events.loose_m2[i] > 0.0 or columns.motion_port.shape[0] > 0:
             _move(
                 x,
                 P,
@@ -548,7 +574,7 @@ def forward(events, columns, model, x, P, memory, first, last, fixes_teach, out)
 
 
 @compiled
-def _fix_row(port, c, ct, st):  # type: ignore[no-untyped-def]
+def _fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
     """East and north derivative of a fix by a parameter whose column value is c."""
     if port == 0:
         return c * ct, c * st

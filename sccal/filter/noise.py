@@ -8,6 +8,7 @@ filter itself over a stretch of the run, with wide log-normal priors that only m
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +20,7 @@ from scipy.optimize import minimize
 
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
-from sccal.arrays import Floats
+from sccal.arrays import Bools, Floats
 from sccal.filter.forward import Noise
 from sccal.filter.iterate import RunProblem, iterate
 from sccal.filter.options import FilterOptions
@@ -103,7 +104,8 @@ class _Likelihood:
         self.others = _other_scales(aligned, start)
 
     def noise(self, logs: Floats) -> Noise:
-        return Noise(*(float(v) for v in np.exp(logs)), other_fix_scale=self.others)
+        white, coloured, tau, scale, fix_coloured, fix_tau, slip = (float(v) for v in np.exp(logs))
+        return Noise(white, coloured, tau, scale, fix_coloured, fix_tau, slip, "estimated", self.others)
 
     def hills(self) -> list[Floats]:
         """Starting points: who may carry the blame for what white noise does not explain."""
@@ -183,7 +185,7 @@ class _Likelihood:
         return list(zip(self.low[self.free], self.high[self.free], strict=True))
 
 
-def _white_level_m(aligned: Aligned, start: Start, rows: np.ndarray) -> float:
+def _white_level_m(aligned: Aligned, start: Start, rows: Bools) -> float:
     """White part of the fix error (m per axis) from second differences against the wheels; NaN where too few.
 
     Second differences of fix minus path cancel the slow errors; of white noise they have 6 times its variance.
@@ -197,7 +199,7 @@ def _white_level_m(aligned: Aligned, start: Start, rows: np.ndarray) -> float:
     second = np.diff(aligned.fix_east_m[index] + 1j * aligned.fix_north_m[index] - path, n=2)
     regular = second[t_s[2:] - t_s[:-2] < 2.5 * float(np.median(t_s[2:] - t_s[:-2]))]
     parts = np.concatenate((regular.real, regular.imag))
-    return NORMAL_MAD * float(np.median(np.abs(parts))) / np.sqrt(6.0)
+    return NORMAL_MAD * float(np.median(np.abs(parts))) / math.sqrt(6.0)
 
 
 def _other_scales(aligned: Aligned, start: Start) -> dict[int, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from sccal.align import Aligned
 from sccal.align.signs import slope_through_origin
-from sccal.arrays import Floats
+from sccal.arrays import Complexes, Floats
 from sccal.errors import DataError
 from sccal.logs.streams import Vehicle
 
@@ -95,8 +95,8 @@ def find_start(aligned: Aligned) -> Start:
     if fit is None or fit.spread_m < 0.3 or fit.sigma_angle > 0.7:
         total = float(np.abs(np.diff(travel)).sum())
         raise DataError(
-            f"the robot hardly moves: the wheels turn for {total:.2f} m in {last - first:.0f} s, and the fixes do not show "
-            "in which direction; drive at least 10 m"
+            f"the robot hardly moves: the wheels turn for {total:.2f} m in {last - first:.0f} s, and the fixes do not "
+            "show in which direction; drive at least 10 m"
         )
     offset = -float(np.angle(fit.alpha))
     yaw_first = float(np.interp(first, aligned.heading_t_s, aligned.yaw_rad))
@@ -118,7 +118,7 @@ def find_start(aligned: Aligned) -> Start:
     )
 
 
-def path_along_yaw(aligned: Aligned) -> np.ndarray:
+def path_along_yaw(aligned: Aligned) -> Complexes:
     """The wheels' signed travel laid out along the AHRS yaw, (n,) complex metres from 0, at the wheels' times."""
     yaw = np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad)
     middle = 0.5 * (yaw[1:] + yaw[:-1])
@@ -158,7 +158,7 @@ class _Similarity:
     sigma_angle: float
 
 
-def _similarity(path: Floats, fixes: Floats, sigma_m: Floats, t_s: Floats) -> _Similarity:
+def _similarity(path: Complexes, fixes: Complexes, sigma_m: Floats, t_s: Floats) -> _Similarity:
     """z = α (p − p̄) + z̄ by reweighted least squares, and how sure the angle of α is."""
     base = 1.0 / sigma_m**2
     weight = base.copy()

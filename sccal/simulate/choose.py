@@ -14,7 +14,7 @@ SEED = "seed"
 
 
 def settings_from(assignments: Sequence[str], seed: int) -> SimulationSettings:
-    """Settings with ``group.name=value`` put in, later ones over earlier ones. Raises UsageError for what is unknown."""
+    """Settings with ``group.name=value`` put in, later ones over earlier. Raises UsageError for what is unknown."""
     groups = dict(_groups())
     chosen: dict[str, dict[str, Any]] = {name: {} for name in groups}
     for assignment in assignments:

@@ -1,0 +1,151 @@
+"""The filter once more, plain and slow: dense matrices, derivatives by complex steps, any float type.
+
+It shares no line with the kernel. Motion and measurements are written once each, as functions of the state, and their
+Jacobians are taken from these functions (Squire and Trapp 1998), so a wrong derivative in the kernel cannot hide here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sccal.filter import kernel as K
+
+BASE = K.BASE_STATES
+
+
+def motion(x, right, left, row, columns):
+    """State after one step of the wheels; complex-safe."""
+    along_right, along_left = x[3] * right, x[4] * left
+    along = side = turn = 0.0
+    for k, (port, param) in enumerate(zip(columns.motion_port, columns.motion_param, strict=True)):
+        part = x[BASE + param] * columns.motion[row, k]
+        along = along + part * (port == K.PORT_ALONG)
+        side = side + part * (port == K.PORT_SIDE)
+        turn = turn + part * (port == K.PORT_TURN)
+        along_right = along_right + part * (port == K.PORT_RIGHT_WHEEL)
+        along_left = along_left + part * (port == K.PORT_LEFT_WHEEL)
+    s = (along_right + along_left) / 2 + along
+    dtheta = (along_right - along_left) / x[5] + turn
+    middle = x[2] + dtheta / 2
+    after = x.copy()
+    after[0] = x[0] + s * np.cos(middle) - side * np.sin(middle)
+    after[1] = x[1] + s * np.sin(middle) + side * np.cos(middle)
+    after[2] = x[2] + dtheta
+    return after
+
+
+def heading_reading(x, row, columns, use_offset):
+    value = x[2] + x[7] + (x[6] if use_offset else 0.0)
+    for k, param in enumerate(columns.heading_param):
+        value = value + x[BASE + param] * columns.heading[row, k]
+    return np.array([value])
+
+
+def fix_reading(x, row, columns):
+    forward = left = east = north = 0.0
+    for k, (port, param) in enumerate(zip(columns.fix_port, columns.fix_param, strict=True)):
+        part = x[BASE + param] * columns.fix[row, k]
+        forward = forward + part * (port == K.PORT_ANTENNA_FORWARD)
+        left = left + part * (port == K.PORT_ANTENNA_LEFT)
+        east = east + part * (port == K.PORT_EAST)
+        north = north + part * (port == K.PORT_NORTH)
+    c, s = np.cos(x[2]), np.sin(x[2])
+    return np.array([x[0] + x[8] + c * forward - s * left + east, x[1] + x[9] + s * forward + c * left + north])
+
+
+def jacobian(function, x, step=1e-30):
+    """Exact derivatives of a complex-safe function."""
+    kind = np.clongdouble if x.dtype == np.longdouble else complex
+    columns = []
+    for k in range(x.size):
+        shifted = x.astype(kind)
+        shifted[k] += 1j * step
+        columns.append(np.imag(function(shifted)) / step)
+    return np.array(columns).T.astype(x.dtype)
+
+
+def update(x, P, nu, H, R):
+    S = H @ P @ H.T + R
+    if S.shape[0] == 1:
+        inverse = 1.0 / S
+    else:
+        inverse = np.array([[S[1, 1], -S[0, 1]], [-S[1, 0], S[0, 0]]]) / (S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0])
+    K_gain = P @ H.T @ inverse
+    shrink = np.eye(x.size, dtype=x.dtype) - K_gain @ H
+    return x + K_gain @ nu, shrink @ P @ shrink.T + K_gain @ R @ K_gain.T, S, float(nu @ inverse @ nu)
+
+
+def run(events, columns, model, x, P, kind=np.float64):
+    """All events; (x, P, heading innovations, fix innovations, accepted headings, accepted fixes)."""
+    x, P = x.astype(kind).copy(), P.astype(kind).copy()
+    n = x.size
+    nu_h, nu_f, ok_h, ok_f = [], [], [], []
+    t_before = t_heading = t_fix = events.t_s[0]
+    for i, t in enumerate(events.t_s):
+        P[np.arange(3, n), np.arange(3, n)] += model.walk[3:] * (t - t_before)
+        t_before = t
+        right, left = kind(events.right_rad[i]), kind(events.left_rad[i])
+        F = jacobian(lambda z, r=right, le=left, i=i: motion(z, r, le, i, columns), x)
+        along = []
+        for radius, angle, port in ((x[3], right, K.PORT_RIGHT_WHEEL), (x[4], left, K.PORT_LEFT_WHEEL)):
+            extra = sum(
+                x[BASE + param] * columns.motion[i, k]
+                for k, param in enumerate(columns.motion_param)
+                if columns.motion_port[k] == port
+            )
+            along.append(radius * angle + extra)
+        variance = [model.slip2 * abs(a) + events.loose_m2[i] for a in along]
+        # Travel of a wheel enters as its angle does: through the derivative by the angle, over the radius.
+        B = jacobian(lambda z, i=i, x=x: motion(x.astype(z.dtype), z[0], z[1], i, columns), np.array([right, left]))
+        B = B / np.array([x[3], x[4]])
+        x = motion(x, right, left, i, columns)
+        P = F @ P @ F.T + B @ np.diag(np.array(variance)) @ B.T
+
+        h = events.heading_row[i]
+        if h >= 0:
+            if model.heading_coloured_var > 0:
+                x, P = decay(x, P, 7, np.exp(-(t - t_heading) / model.heading_tau_s), model.heading_coloured_var)
+            t_heading = t
+
+            def reading(z, h=h):
+                return heading_reading(z, h, columns, model.use_offset)
+
+            nu = events.yaw_rad[h] - reading(x)
+            nu = (nu + np.pi) % (2 * np.pi) - np.pi
+            H = jacobian(reading, x)
+            R = np.array([[kind(events.yaw_var_rad2[h])]])
+            moved, shrunk, _, nis = update(x, P, nu, H, R)
+            nu_h.append(float(nu[0]))
+            ok_h.append(nis <= model.heading_gate)
+            if ok_h[-1]:
+                x, P = moved, shrunk
+
+        f = events.fix_row[i]
+        if f >= 0:
+            if model.fix_coloured_var > 0:
+                factor = np.exp(-(t - t_fix) / model.fix_tau_s)
+                x, P = decay(x, P, 8, factor, model.fix_coloured_var)
+                x, P = decay(x, P, 9, factor, model.fix_coloured_var)
+            t_fix = t
+
+            def position(z, f=f):
+                return fix_reading(z, f, columns)
+
+            nu = np.array([events.fix_east_m[f], events.fix_north_m[f]], dtype=kind) - position(x)
+            cov = events.fix_cov_m2[f]
+            R = np.array([[events.fix_var_east_m2[f], cov], [cov, events.fix_var_north_m2[f]]], dtype=kind)
+            moved, shrunk, _, nis = update(x, P, nu, jacobian(position, x), R)
+            nu_f.append([float(v) for v in nu])
+            ok_f.append(nis <= model.fix_gate)
+            if ok_f[-1]:
+                x, P = moved, shrunk
+    return x, P, np.array(nu_h), np.array(nu_f).reshape(-1, 2), np.array(ok_h), np.array(ok_f)
+
+
+def decay(x, P, state, factor, stationary_var):
+    x, P = x.copy(), P.copy()
+    x[state] *= factor
+    P[state, :] *= factor
+    P[:, state] *= factor
+    P[state, state] += (1 - factor**2) * stationary_var
+    return x, P
