@@ -18,29 +18,32 @@ from sccal.arrays import Floats
 
 GRID_S = 0.1
 SHIFTS = 8
-THRESHOLD_SIGMAS = 4.0
+THRESHOLD_SIGMAS = 5.0
 NORMAL_MAD = 1.4826
 
 
 def denoised_angles(
     wheel_t_s: Floats, right_rad: Floats, left_rad: Floats, right_over_left: float
 ) -> tuple[Floats, Floats, Floats]:
-    """A uniform time grid (g,) and the cumulative right and left angles on it, freed of noise.
+    """Every k-th time of the wheels (g,) and the cumulative right and left angles there, freed of noise.
+
+    On samples, not between them: interpolation would make neighbouring steps share noise.
 
     right_over_left is R_r/R_l as far as known: with it, straight driving has no turn at any speed.
     """
-    count = max(int(np.ceil((wheel_t_s[-1] - wheel_t_s[0]) / GRID_S)), 2)
-    grid = np.linspace(wheel_t_s[0], wheel_t_s[-1], count + 1)
-    right = np.diff(np.interp(grid, wheel_t_s, right_rad)) * right_over_left
-    left = np.diff(np.interp(grid, wheel_t_s, left_rad))
+    every = max(round(GRID_S / float(np.median(np.diff(wheel_t_s)))), 1)
+    chosen = np.append(np.arange(0, wheel_t_s.size - 1, every), wheel_t_s.size - 1)
+    grid = wheel_t_s[chosen]
+    right = np.diff(right_rad[chosen]) * right_over_left
+    left = np.diff(left_rad[chosen])
     travelled = np.abs(right) + np.abs(left)
     both = _denoise(right + left, travelled)
     difference = _denoise(right - left, travelled)
     zero = np.zeros(1)
     return (
         grid,
-        np.concatenate((zero, np.cumsum(0.5 * (both + difference)))) / right_over_left,
-        np.concatenate((zero, np.cumsum(0.5 * (both - difference)))),
+        right_rad[0] + np.concatenate((zero, np.cumsum(0.5 * (both + difference)))) / right_over_left,
+        left_rad[0] + np.concatenate((zero, np.cumsum(0.5 * (both - difference)))),
     )
 
 

@@ -20,7 +20,7 @@ from sccal.arrays import Floats
 from sccal.calibration.outage import summarise
 from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 from sccal.calibration.status import judge
-from sccal.filter.forward import bounds, prior_covariance
+from sccal.filter.forward import numeric_limits, prior_covariance
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import Constants
 from sccal.logs.streams import Notice
@@ -61,15 +61,15 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
             vehicle, only.with_offset, (only,), only.parameters, only.fit, only.outage, None, effects=only.effects
         )
     prior = _prior_precision(first)
-    nominal = Constants.nominal(vehicle).as_array()
-    lower, upper = bounds(vehicle, options)
+    centre = np.median([problem.centre.as_array() for problem in problems], axis=0)
+    lower, upper = numeric_limits(first.centre)
     at = _rough_mean(runs)
     for _ in range(MAX_ROUNDS):
         shared = Constants(*(float(v) for v in at))
         likelihoods = [RunLikelihood.of(problem, shared) for problem in problems]
         precision = prior + sum(one.precision for one in likelihoods)
         covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-        mode = np.clip(covariance @ (prior @ nominal + sum(one.vector for one in likelihoods)), lower, upper)
+        mode = np.clip(covariance @ (prior @ centre + sum(one.vector for one in likelihoods)), lower, upper)
         moved = np.abs(mode - at) / np.sqrt(np.diag(covariance))
         at = mode
         if moved.max() < CLOSE_SIGMAS:
@@ -105,7 +105,7 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
 
 
 def _prior_precision(problem: RunProblem) -> Floats:
-    return np.asarray(np.linalg.inv(prior_covariance(problem.aligned.vehicle, problem.options)))
+    return np.asarray(np.linalg.inv(prior_covariance(problem.centre, problem.options)))
 
 
 def _rough_mean(runs: Sequence[Calibration]) -> Floats:

@@ -6,13 +6,13 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Drive, Estimate, Parameters
-from sccal.filter.forward import bounds, prior_covariance
+from sccal.filter.forward import prior_covariance
 from sccal.filter.options import FilterOptions
+from sccal.filter.start import Constants
 from sccal.logs.streams import Vehicle
 
 UNOBSERVED_RATIO = 0.5
 """A parameter whose sigma is still more than this share of its prior's was not moved off the prior by the data."""
-BOUND_SIGMAS = 1.0
 OFFSET_UNOBSERVED_RAD = np.radians(10.0)
 
 
@@ -25,9 +25,9 @@ def judge(
 ) -> Parameters:
     """Parameters from R_r, R_l, L, Ofs (4,) and their covariance (4, 4)."""
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    prior = np.sqrt(np.diag(prior_covariance(vehicle, options)))
-    nominal = np.array([vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m])
-    lower, upper = bounds(vehicle, options)
+    nominal = Constants.nominal(vehicle).as_array()
+    prior = np.sqrt(np.diag(prior_covariance(Constants.nominal(vehicle), options)))
+    factors = np.array([options.radius_bounds, options.radius_bounds, options.track_bounds])
     names = ("right radius", "left radius", "track")
     found: list[Estimate] = []
     for k in range(3):
@@ -36,12 +36,11 @@ def judge(
         if sigma[k] > UNOBSERVED_RATIO * prior[k]:
             status = "unobserved"
             reason = _why_unobserved(names[k], drive)
-        elif value <= lower[k] + BOUND_SIGMAS * sigma[k] or value >= upper[k] - BOUND_SIGMAS * sigma[k]:
+        elif not factors[k, 0] * nominal[k] < value < factors[k, 1] * nominal[k]:
             status = "at_bound"
-            edge = lower[k] if value < nominal[k] else upper[k]
             reason = (
-                f"the {names[k]} ran to its bound of {edge:.4g} m: check ticks_per_rev, wheel_radius_m and track_m in "
-                "vehicle.toml"
+                f"the {names[k]} comes out at {value / nominal[k]:.2f} times its nominal value, beyond what wear or load "
+                "explain: check ticks_per_rev, wheel_radius_m and track_m in vehicle.toml"
             )
         found.append(Estimate(value, float(sigma[k]), status, reason, float(nominal[k]), float(prior[k])))  # type: ignore[arg-type]
     return Parameters(found[0], found[1], found[2], _judge_offset(float(values[3]), float(sigma[3]), options))

@@ -15,7 +15,9 @@ from sccal.filter.compiled import is_compiled
 from sccal.filter.kernel import BASE_STATES, Columns, Events, Model, Output
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start
-from sccal.logs.streams import Vehicle
+
+
+NUMERIC_RANGE = 5.0
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,7 @@ class Filter:
         timeline: Timeline,
         noise: Noise,
         options: FilterOptions,
+        centre: Constants,
         clear: tuple[Floats, Floats],
         linear_at: Constants | None = None,
         columns: Columns | None = None,
@@ -91,7 +94,7 @@ class Filter:
         self.states = BASE_STATES + effects
         self.events = make_events(aligned, timeline, noise, clear)
         self.columns = no_columns(self.events) if columns is None else columns
-        self.model = make_model(aligned.vehicle, options, noise, self.states, linear_at)
+        self.model = make_model(centre, options, noise, self.states, linear_at)
         self.output = self.make_output(with_states=True)
         self.x = np.zeros(self.states)
         self.P = np.zeros((self.states, self.states))
@@ -116,8 +119,8 @@ class Filter:
             total=np.zeros(2),
         )
 
-    def begin(self, start: Start, constants: Constants, vehicle: Vehicle) -> None:
-        """Set state and covariance at the first event, with the usual priors around the given constants."""
+    def begin(self, start: Start, constants: Constants, prior: Floats) -> None:
+        """Set state and covariance at the first event; prior is the covariance of R_r, R_l, L (3, 3)."""
         options = self.options
         offset = start.offset_rad if options.with_offset else 0.0
         self.x[:] = 0.0
@@ -131,7 +134,7 @@ class Filter:
         variance[7] = self.model.heading_coloured_var
         variance[8:10] = self.model.fix_coloured_var
         self.P[:] = np.diag(variance)
-        self.P[3:6, 3:6] = prior_covariance(vehicle, options)
+        self.P[3:6, 3:6] = prior
         self.memory[:] = 0.0
         self.memory[: kernel.MEM_FIX_T + 1] = self.events.t_s[0]
         self.output.total[:] = 0.0
@@ -185,33 +188,33 @@ class Filter:
         )
 
 
-def prior_covariance(vehicle: Vehicle, options: FilterOptions) -> Floats:
+def prior_covariance(centre: Constants, options: FilterOptions) -> Floats:
     """Prior covariance of R_r, R_l, L (3, 3), m²: common and differential error of the radii, and the track's."""
-    radius2 = (options.radius_prior * vehicle.wheel_radius_m) ** 2
-    difference2 = (options.radius_difference_prior * vehicle.wheel_radius_m) ** 2
+    radius_m = 0.5 * (centre.radius_right_m + centre.radius_left_m)
+    radius2 = (options.radius_prior * radius_m) ** 2
+    difference2 = (options.radius_difference_prior * radius_m) ** 2
     shared = radius2 - 0.5 * min(difference2, 2.0 * radius2)
-    track2 = (options.track_prior * vehicle.track_m) ** 2
+    track2 = (options.track_prior * centre.track_m) ** 2
     return np.array([[radius2, shared, 0.0], [shared, radius2, 0.0], [0.0, 0.0, track2]])
 
 
-def bounds(vehicle: Vehicle, options: FilterOptions) -> tuple[Floats, Floats]:
-    """Lower and upper physical bounds of R_r, R_l, L (m)."""
-    scale = np.array([vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m])
-    factors = np.array([options.radius_bounds, options.radius_bounds, options.track_bounds])
-    return scale * factors[:, 0], scale * factors[:, 1]
+def numeric_limits(centre: Constants) -> tuple[Floats, Floats]:
+    """Where the numbers for R_r, R_l, L are held for safety: far beyond every prior, and never near zero."""
+    middle = centre.as_array()
+    return middle / NUMERIC_RANGE, middle * NUMERIC_RANGE
 
 
 def make_model(
-    vehicle: Vehicle, options: FilterOptions, noise: Noise, states: int, linear_at: Constants | None = None
+    centre: Constants, options: FilterOptions, noise: Noise, states: int, linear_at: Constants | None = None
 ) -> Model:
     """The kernel's numbers; without ``linear_at``, derivatives are taken at the running estimate."""
     from scipy.special import erfc
 
     walk = np.zeros(states)
-    walk[3:5] = (options.radius_walk * vehicle.wheel_radius_m) ** 2
-    walk[5] = (options.track_walk * vehicle.track_m) ** 2
+    walk[3:5] = (options.radius_walk * centre.radius_right_m) ** 2
+    walk[5] = (options.track_walk * centre.track_m) ** 2
     walk[6] = options.offset_walk_rad**2 if options.with_offset else 0.0
-    lower, upper = bounds(vehicle, options)
+    lower, upper = numeric_limits(centre)
     outside = float(erfc(options.gate_sigmas / np.sqrt(2.0)))
     return Model(
         slip2=noise.slip_m_per_sqrt_m**2,

@@ -13,9 +13,9 @@ import numpy as np
 
 from sccal.align import Aligned, Timeline, clear_steps
 from sccal.arrays import Floats
-from sccal.filter.forward import Filter, ForwardPass, Noise, bounds, prior_covariance
+from sccal.filter.forward import Filter, ForwardPass, Noise, numeric_limits, prior_covariance
 from sccal.filter.options import FilterOptions
-from sccal.filter.start import Constants, Start
+from sccal.filter.start import Constants, Start, first_constants
 
 MAX_ROUNDS = 6
 CLOSE_SIGMAS = 0.05
@@ -31,6 +31,11 @@ class RunProblem:
     noise: Noise
     options: FilterOptions
 
+    @property
+    def centre(self) -> Constants:
+        """The middle of the constants' priors."""
+        return first_constants(self.aligned, self.start)
+
     def clear_steps(self, constants: Constants) -> tuple[Floats, Floats]:
         """The wheels' motion freed of slip, given the ratio of the radii."""
         return clear_steps(self.aligned, self.timeline, constants.radius_right_m / constants.radius_left_m)
@@ -43,8 +48,8 @@ class RunProblem:
     ) -> Filter:
         """A filter at the first event, its constants' priors around the given values."""
         clear = self.clear_steps(constants) if clear is None else clear
-        run = Filter(self.aligned, self.timeline, self.noise, self.options, clear, linear_at)
-        run.begin(self.start, constants, self.aligned.vehicle)
+        run = Filter(self.aligned, self.timeline, self.noise, self.options, self.centre, clear, linear_at)
+        run.begin(self.start, constants, prior_covariance(self.centre, self.options))
         return run
 
 
@@ -54,16 +59,15 @@ def iterate(problem: RunProblem, first: Constants, max_rounds: int = MAX_ROUNDS)
     A pass that starts at x* with prior covariance P0 treats x* as the prior mean. To first order the posterior with
     the true prior mean m0 is then its own mean plus P P0⁻¹ (m0 − x*), P its posterior covariance.
     """
-    vehicle = problem.aligned.vehicle
-    nominal = Constants.nominal(vehicle).as_array()
-    information = np.linalg.inv(prior_covariance(vehicle, problem.options))
-    lower, upper = bounds(vehicle, problem.options)
+    centre = problem.centre.as_array()
+    information = np.linalg.inv(prior_covariance(problem.centre, problem.options))
+    lower, upper = numeric_limits(problem.centre)
     at = np.clip(first.as_array(), lower, upper)
     for _ in range(max_rounds):
         constants = Constants(*(float(v) for v in at))
         found = problem.begun(constants, linear_at=constants).finish()
         covariance = found.final_covariance[3:7, 3:7]
-        mode = found.final_state[3:7] + covariance[:, :3] @ information @ (nominal - at)
+        mode = found.final_state[3:7] + covariance[:, :3] @ information @ (centre - at)
         mode[:3] = np.clip(mode[:3], lower, upper)
         moved = np.abs(mode[:3] - at) / np.sqrt(np.maximum(np.diag(covariance)[:3], 1e-30))
         at = mode[:3]

@@ -36,5 +36,5 @@ class FilterOptions:
     recover_s: float = 3.0
     """… over so long: the filter, not the measurements, is wrong; it opens up again."""
     radius_bounds: tuple[float, float] = (0.5, 2.0)
-    """Physical bounds as multiples of the nominal radius."""
+    """Physical bounds as multiples of the nominal radius: beyond, the declaration is wrong, not the wheel worn."""
     track_bounds: tuple[float, float] = (0.3, 4.0)

@@ -126,18 +126,21 @@ def path_along_yaw(aligned: Aligned) -> Complexes:
 
 
 def first_constants(aligned: Aligned, start: Start) -> Constants:
-    """Nominal values, unless the start already shows that the wheels' scale is far off."""
+    """Nominal values, unless the start already shows that the wheels' scale is far off: the centre of the priors.
+
+    A wrong gear ratio or a radius in inches is no reason for a wrong answer, only for a status and a warning.
+    """
     vehicle = aligned.vehicle
     if abs(start.wheel_scale - 1.0) <= ODD_SCALE:
         return Constants.nominal(vehicle)
-    radius = vehicle.wheel_radius_m * float(np.clip(start.wheel_scale, 0.5, 2.0))
+    radius = vehicle.wheel_radius_m * start.wheel_scale
     return Constants(radius, radius, vehicle.track_m)
 
 
 def coarse_constants(aligned: Aligned, start: Start) -> Constants:
     """Radii and track near enough to linearise at: the start's scale, and the AHRS's turning over the wheels'."""
     vehicle = aligned.vehicle
-    scale = float(np.clip(start.wheel_scale, 0.5, 2.0))
+    scale = start.wheel_scale
     t_s = np.arange(max(aligned.span_s[0], aligned.heading_t_s[0]), min(aligned.span_s[1], aligned.heading_t_s[-1]))
     wheels = np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.right_rad - aligned.left_rad))
     wheels *= scale * vehicle.wheel_radius_m / vehicle.track_m
