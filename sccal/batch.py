@@ -16,7 +16,7 @@ from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
 from sccal.logs.run import RunSource, discover, read_run
 from sccal.logs.streams import Vehicle
-from sccal.report.write import write_calibration, write_vehicle
+from sccal.report.write import begin_loading, write_calibration, write_vehicle
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,7 @@ def calibrate_paths(
     if sources:
         _check_out(out, sources)
         say_if_compiling()
+        begin_loading()
     of_vehicle: dict[tuple[object, ...], list[tuple[Calibration, RunProblem]]] = {}
     for source in sources:
         try:

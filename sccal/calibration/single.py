@@ -131,11 +131,11 @@ def describe_drive(aligned: Aligned, radius_m: float) -> Drive:
     return Drive(
         duration_s=aligned.span_s[1] - aligned.span_s[0],
         distance_m=float(np.abs(steps).sum()),
-        reversed_m=float(-steps[steps < 0].sum()),
+        reversed_m=abs(float(steps[steps < 0].sum())),
         standing_s=float(0.5 * ((np.abs(speed) < STANDING_MPS) & wheels_stand).sum()),
         max_speed_mps=float(np.abs(speed).max()) if speed.size else 0.0,
         turned_left_rad=float(turn[turning & (turn > 0)].sum()),
-        turned_right_rad=float(-turn[turning & (turn < 0)].sum()),
+        turned_right_rad=abs(float(turn[turning & (turn < 0)].sum())),
     )
 
 

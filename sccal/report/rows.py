@@ -16,6 +16,8 @@ STATUS_WORDS: Mapping[Status, str] = {
     "held": "held",
 }
 
+UNSEEN = "-"
+
 _UNITS = ("deg_per_hour", "deg_per_mps", "per_radps", "per_mps2", "per_mps", "per_hour", "deg", "ppm", "at_s", "m", "s")
 
 
@@ -30,17 +32,22 @@ class Row:
     estimate: Estimate
 
     @property
+    def seen(self) -> bool:
+        """False where the value is only the prior, which must not be shown as if it were a result."""
+        return self.estimate.status != "unobserved"
+
+    @property
     def value(self) -> str:
         """Without unit, rounded by sigma."""
-        return value_and_sigma(self.estimate.value, self.estimate.sigma)[0]
+        return value_and_sigma(self.estimate.value, self.estimate.sigma)[0] if self.seen else UNSEEN
 
     @property
     def sigma(self) -> str:
-        return value_and_sigma(self.estimate.value, self.estimate.sigma)[1]
+        return value_and_sigma(self.estimate.value, self.estimate.sigma)[1] if self.seen else ""
 
     @property
     def value_with_sigma(self) -> str:
-        return with_sigma(self.estimate.value, self.estimate.sigma)
+        return with_sigma(self.estimate.value, self.estimate.sigma) if self.seen else UNSEEN
 
     @property
     def nominal(self) -> str:
@@ -48,7 +55,7 @@ class Row:
 
     @property
     def change(self) -> str:
-        if self.estimate.nominal is None or self.unit == "deg":
+        if self.estimate.nominal is None or self.unit == "deg" or not self.seen:
             return ""
         text = change_percent(self.estimate.value, self.estimate.sigma, self.estimate.nominal)
         return "" if text == MISSING else text

@@ -82,7 +82,7 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
 def _parameter_table(rows: Sequence[Row], width: int) -> list[str]:
     header = ("parameter", "value", "", "unit", "nominal", "change", "status")
     cells = [
-        (row.name, row.value, f"± {row.sigma}", row.unit, row.nominal or "-", row.change or "-", row.status)
+        (row.name, row.value, f"± {row.sigma}" if row.sigma else "", row.unit, row.nominal or "-", row.change or "-", row.status)
         for row in rows
     ]
     lines = _columns([header, *cells], "<><<>><")
@@ -134,6 +134,8 @@ def _compact(parameters: Parameters) -> tuple[str, ...]:
 
 
 def _marked(estimate: Estimate, scale: float) -> str:
+    if estimate.status == "unobserved":
+        return _MARKS["unobserved"]
     value, sigma = value_and_sigma(scale * estimate.value, scale * estimate.sigma)
     return f"{value} ±{sigma}{_MARKS[estimate.status]}"
 

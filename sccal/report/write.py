@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import threading
 from pathlib import Path
 
 from sccal.calibration.result import Calibration, VehicleCalibration
@@ -9,6 +11,11 @@ from sccal.logs.write import write_text
 from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
+
+
+def begin_loading() -> None:
+    """Load what draws the pages beside other work: the filter leaves the interpreter free while it runs."""
+    threading.Thread(target=importlib.import_module, args=("sccal.report.html",), daemon=True).start()
 
 
 def write_numbers(c: Calibration, folder: Path) -> None:

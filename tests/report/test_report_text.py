@@ -40,7 +40,7 @@ def test_one_line_per_run_with_marks_and_their_meaning(a_vehicle: VehicleCalibra
     lines = vehicle_text(a_vehicle, 100).splitlines()
     assert [line.split()[0] for line in lines[3:5]] == ["yard/figure-eight", "yard/square"]
     assert "96.000 ±0.010!" in lines[5]
-    assert "700 ±50?" in lines[5]
+    assert "±n/a              ? " in lines[5]
     assert lines[6] == "? not observed, ! at bound, = held"
 
 
