@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
@@ -120,8 +121,8 @@ def _robust_hat_fit(t_s: Floats, values: Floats, knots: Floats) -> tuple[Floats,
         beside = np.bincount(left, weight * lower * upper, knots.size)[:-1]
         right_side = np.bincount(left, weight * lower * values, knots.size)
         right_side += np.bincount(left + 1, weight * upper * values, knots.size)
-        matrix = np.diag(diagonal + 1e-9 * diagonal.max()) + np.diag(beside, 1) + np.diag(beside, -1)
-        fitted = np.linalg.solve(matrix, right_side)
+        banded = np.array([np.concatenate(([0.0], beside)), diagonal + 1e-9 * diagonal.max()])
+        fitted = solveh_banded(banded, right_side)
         residual = values - (lower * fitted[left] + upper * fitted[left + 1])
         scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-6)
         weight = 1.0 / np.maximum(np.abs(residual), 0.5 * scale)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -208,14 +209,12 @@ def make_model(
     centre: Constants, options: FilterOptions, noise: Noise, states: int, linear_at: Constants | None = None
 ) -> Model:
     """The kernel's numbers; without ``linear_at``, derivatives are taken at the running estimate."""
-    from scipy.special import erfc
-
     walk = np.zeros(states)
     walk[3:5] = (options.radius_walk * centre.radius_right_m) ** 2
     walk[5] = (options.track_walk * centre.track_m) ** 2
     walk[6] = options.offset_walk_rad**2 if options.with_offset else 0.0
     lower, upper = numeric_limits(centre)
-    outside = float(erfc(options.gate_sigmas / np.sqrt(2.0)))
+    outside = math.erfc(options.gate_sigmas / math.sqrt(2.0))
     return Model(
         slip2=noise.slip_m_per_sqrt_m**2,
         heading_coloured_var=noise.heading_coloured_rad**2 if options.with_offset else 0.0,
@@ -227,7 +226,7 @@ def make_model(
         lower=lower,
         upper=upper,
         heading_gate=options.gate_sigmas**2,
-        fix_gate=-2.0 * float(np.log(outside)),
+        fix_gate=-2.0 * math.log(max(outside, 1e-300)),
         soft_gate=options.soft_gate,
         recover_count=float(options.recover_count),
         recover_s=options.recover_s,

@@ -74,7 +74,7 @@ def read_run(source: RunSource) -> Run:
         )
     if source.vehicle_toml is None:
         raise DataError(
-            f"{source.path}: no vehicle.toml here or in any folder up to {source.searched_up_to or source.path}; "
+            f"{source.path}: no vehicle.toml here or above, up to {source.searched_up_to or source.path}; "
             f"add one with {MINIMAL_VEHICLE}"
         )
     vehicle, notices = read_vehicle(source.vehicle_toml)
@@ -133,6 +133,10 @@ def _run_folders(root: Path) -> Iterator[Path]:
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
+    """Up to the path given; where that is a run itself, its campaign's folder just above counts too."""
+    if folder == root and not (folder / "vehicle.toml").is_file():
+        above = root.resolve().parent / "vehicle.toml"
+        return above if above.is_file() else None
     while True:
         if (folder / "vehicle.toml").is_file():
             return folder / "vehicle.toml"

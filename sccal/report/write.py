@@ -36,11 +36,12 @@ def write_calibration(c: Calibration, folder: Path) -> None:
 
 
 def write_vehicle(v: VehicleCalibration, out: Path, stem: str = "vehicle") -> None:
-    """``<stem>.json``, ``<stem>.html`` and the parameters to deploy; the page expects each run's folder beside it."""
-    from sccal.report.html import vehicle_html
-
+    """``<stem>.json`` and the parameters to deploy; for several runs a page, which expects their folders beside it."""
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / f"{stem}.json", json_text(vehicle_json(v)))
     yaml_name = "ros2_control.yaml" if stem == "vehicle" else f"{stem}-ros2_control.yaml"
     write_text(out / yaml_name, ros2_control_yaml(v))
-    write_text(out / f"{stem}.html", vehicle_html(v, json_link=f"{stem}.json"))
+    if len(v.runs) > 1:
+        from sccal.report.html import vehicle_html
+
+        write_text(out / f"{stem}.html", vehicle_html(v, json_link=f"{stem}.json"))

@@ -114,7 +114,7 @@ def test_the_wheel_that_counts_backwards_is_named(drive, name, side, convention)
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_on_a_straight_line_one_wheel_counts_backwards(drive, side):
-    with pytest.raises(DataError, match="one wheel seems to count backwards.*negate left_ticks or right_ticks$"):
+    with pytest.raises(DataError, match=r"one wheel seems to count backwards.*negate left_ticks or right_ticks$"):
         align(wheel_backwards(drive("straight"), side))
 
 

@@ -70,11 +70,20 @@ def test_the_nearest_vehicle_up_to_the_root_applies(tmp_path: Path) -> None:
     assert discover([tmp_path / "logs"])[0].vehicle_toml == tmp_path / "logs" / "vehicle.toml"
     (tmp_path / "logs" / "a" / "vehicle.toml").write_text(VEHICLE)
     assert discover([tmp_path / "logs"])[0].vehicle_toml == tmp_path / "logs" / "a" / "vehicle.toml"
-    source = discover([tmp_path / "logs" / "a" / "run"])[0]
+    (tmp_path / "logs" / "a" / "vehicle.toml").unlink()
+    source = discover([tmp_path / "logs" / "a"])[0]
     assert source.vehicle_toml is None
-    with pytest.raises(DataError, match=r"no vehicle\.toml here or in any folder up to") as caught:
+    with pytest.raises(DataError, match=r"no vehicle\.toml here or above, up to") as caught:
         read_run(source)
     assert "wheel_radius_m = 0.08" in str(caught.value)
+
+
+def test_for_a_run_given_alone_the_folder_just_above_counts_too(tmp_path: Path) -> None:
+    make_run(tmp_path / "logs" / "run", vehicle=False)
+    (tmp_path / "vehicle.toml").write_text(VEHICLE)
+    assert discover([tmp_path / "logs" / "run"])[0].vehicle_toml is None
+    (tmp_path / "logs" / "vehicle.toml").write_text(VEHICLE)
+    assert discover([tmp_path / "logs" / "run"])[0].vehicle_toml == (tmp_path / "logs" / "vehicle.toml").resolve()
 
 
 def test_a_file_of_a_run_stands_for_its_folder(tmp_path: Path) -> None:

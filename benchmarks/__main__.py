@@ -1,0 +1,90 @@
+"""``python -m benchmarks``: one hour of log through the readers, the kernel and the whole command."""
+
+from __future__ import annotations
+
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from sccal.align import align, build_timeline
+from sccal.calibration.options import CalibrationOptions
+from sccal.filter.forward import Noise
+from sccal.filter.iterate import RunProblem
+from sccal.filter.start import Constants, find_start
+from sccal.logs.run import discover, read_run
+from sccal.simulate.choose import settings_from
+from sccal.simulate.files import write_run, write_vehicle_file
+from sccal.simulate.run import simulate_run
+
+HOUR = ("drive.path=general", "drive.duration_s=3600", "ahrs.rate_hz=100")
+NOISE = Noise(0.0026, 0.007, 15.0, 0.67, 0.01, 60.0, 0.003, "given")
+REPEATS = 5
+
+
+def timed(what: Callable[[], object], repeats: int = REPEATS) -> tuple[float, float, float]:
+    """Shortest, median and longest time of a call, s, after one that is not counted."""
+    what()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        what()
+        times.append(time.perf_counter() - begin)
+    return min(times), statistics.median(times), max(times)
+
+
+def show(name: str, times: tuple[float, float, float], note: str = "") -> None:
+    print(f"{name:<44}{times[0]:8.3f}{times[1]:8.3f}{times[2]:8.3f}  {note}", flush=True)
+
+
+def kernel_against_oracle(count: int = 2000) -> tuple[float, float]:
+    """Seconds per event of the kernel, and how many times longer the plain dense filter takes."""
+    from tests.filter import oracle
+    from tests.filter.events import make
+    from tests.filter.test_kernel import run
+
+    events, columns, model, x, P = make(count)
+    long = make(200_000)
+    begin = time.perf_counter()
+    oracle.run(events, columns, model, x, P)
+    plain = (time.perf_counter() - begin) / count
+    kernel = timed(lambda: run(*long), 3)[1] / 200_000
+    return kernel, plain / kernel
+
+
+def main() -> None:
+    print(f"{'seconds':<44}{'min':>8}{'median':>8}{'max':>8}")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "hour"
+        settings = settings_from(HOUR, 1)
+        write_run(simulate_run(settings), folder)
+        write_vehicle_file(settings, folder)
+        (source,) = discover([folder])
+
+        show("read one hour (100 Hz, 100 Hz, 5 Hz)", timed(lambda: read_run(source)))
+        run = read_run(source)
+        show("align it", timed(lambda: align(run)))
+        aligned = align(run)
+        problem = RunProblem(aligned, build_timeline(aligned), find_start(aligned), NOISE, CalibrationOptions().filter)
+        constants = Constants.nominal(aligned.vehicle)
+        clear = problem.clear_steps(constants)
+        events = problem.timeline.t_s.size
+        passes = timed(lambda: problem.begun(constants, None, clear).finish())
+        show("one pass of the filter", passes, f"{1e9 * passes[1] / events:.0f} ns an event, {events:,} events")
+
+        command = [sys.executable, "-m", "sccal", "calibrate", str(folder), "--out", str(Path(name) / "out")]
+        whole = timed(lambda: subprocess.run(command, check=True, capture_output=True), 3)
+        peak_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        show("sccal calibrate, the whole process", whole, f"{peak_mb:.0f} MB at most")
+        help_command = [sys.executable, "-m", "sccal", "--help"]
+        show("sccal --help", timed(lambda: subprocess.run(help_command, check=True, capture_output=True)))
+    seconds, ratio = kernel_against_oracle()
+    print(f"the kernel takes {1e9 * seconds:.0f} ns an event; plain dense numpy beside it {ratio:.0f} times as long")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,179 @@
+"""The building: imports point down only, the front door is light, and every room stays readable."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import sccal
+
+PACKAGE = Path(sccal.__file__).parent
+MODULES = sorted(PACKAGE.rglob("*.py"))
+FLOORS = (
+    {"errors", "arrays"},
+    {"geodesy", "logs"},
+    {"align"},
+    {"effects"},
+    {"filter"},
+    {"calibration"},
+    {"simulate"},
+    {"report"},
+    {"batch"},
+    {"cli"},
+)
+"""Ground floor first; a room imports from lower floors only."""
+FREE = {"__init__", "__main__"}
+MAY_IMPORT = {"simulate": {"errors", "arrays", "geodesy", "logs"}}
+"""Rooms that may use less than all the floors below: a simulator that shared the filter's code would prove nothing."""
+MUST_NOT_IMPORT = {"report": {"scipy", "numba"}, "cli": {"numpy", "pandas", "numba", "scipy", "matplotlib"}}
+LONGEST_MODULE = 600
+NAMES_OF_NOTHING = {"utils", "util", "helpers", "helper", "common", "misc"}
+
+each_module = pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+
+
+def floor_of(room: str) -> int:
+    for number, rooms in enumerate(FLOORS):
+        if room in rooms:
+            return number
+    raise AssertionError(f"sccal.{room} is on no floor: give it one in FLOORS")
+
+
+def room_of(path: Path) -> str:
+    """The first name below the package: ``filter`` for filter/kernel.py, ``batch`` for batch.py."""
+    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def imported(node: ast.AST, at_start_only: bool = False) -> Iterator[tuple[int, str]]:
+    """Line and full name of every import, in functions too unless told, but none for type checkers only."""
+    below: list[ast.AST] = list(ast.iter_child_nodes(node))
+    if isinstance(node, ast.Import):
+        yield from ((node.lineno, alias.name) for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        assert node.level == 0, f"line {node.lineno}: relative import"
+        yield from ((node.lineno, f"{node.module}.{alias.name}") for alias in node.names)
+    elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+        below = list(node.orelse)
+    elif at_start_only and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+        below = []
+    for child in below:
+        yield from imported(child, at_start_only)
+
+
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def rooms_imported(path: Path) -> Iterator[tuple[int, str]]:
+    for line, name in imported(parsed(path)):
+        parts = name.split(".")
+        if parts[0] == "sccal" and len(parts) > 1 and not parts[1].startswith("__"):
+            yield line, parts[1]
+
+
+def test_imports_are_found_wherever_they_stand():
+    source = """
+import numpy
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    from sccal.cli import main
+else:
+    import math
+def late():
+    try:
+        from sccal.report import text, html
+    except ImportError:
+        import sccal.batch
+"""
+    found = [name for _, name in imported(ast.parse(source))]
+    assert found == [
+        "numpy",
+        "typing.TYPE_CHECKING",
+        "math",
+        "sccal.report.text",
+        "sccal.report.html",
+        "sccal.batch",
+    ]
+    assert [name for _, name in imported(ast.parse(source), at_start_only=True)] == found[:3]
+
+
+def test_the_package_is_seen():
+    assert {"errors", "logs", "align", "filter", "cli"} <= {room_of(path) for path in MODULES}
+    assert "calibration" in {room for _, room in rooms_imported(PACKAGE / "batch.py")}
+
+
+@each_module
+def test_imports_point_down_only(path):
+    room = room_of(path)
+    if room in FREE:
+        return
+    for line, other in rooms_imported(path):
+        assert other == room or floor_of(other) < floor_of(room), f"line {line}: {room} imports {other}"
+
+
+@each_module
+def test_some_rooms_may_use_less(path):
+    room = room_of(path)
+    if room in MAY_IMPORT:
+        for line, other in rooms_imported(path):
+            assert other == room or other in MAY_IMPORT[room], f"line {line}: {room} imports {other}"
+
+
+@each_module
+def test_what_a_room_must_not_import(path):
+    room = room_of(path)
+    for line, name in imported(parsed(path), at_start_only=room == "cli"):
+        assert name.split(".")[0] not in MUST_NOT_IMPORT.get(room, set()), f"line {line}: {room} imports {name}"
+
+
+@each_module
+def test_figures_are_drawn_without_pyplot(path):
+    assert not [name for _, name in imported(parsed(path)) if name.startswith("matplotlib.pyplot")]
+
+
+@pytest.mark.parametrize("start", ["import sccal", "import sccal.cli"])
+def test_the_front_door_is_light(start):
+    heavy = ("numpy", "pandas", "numba", "scipy", "matplotlib", "pyproj", "jinja2")
+    script = f"import sys; {start}; print(*[name for name in {heavy!r} if name in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == []
+
+
+def test_help_needs_nothing_heavy():
+    script = (
+        "import sys\nsys.argv = ['sccal', 'calibrate', '--help']\nfrom sccal.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print([name for name in ('numpy', 'pandas', 'numba') if name in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert found.stdout.splitlines()[-1] == "[]"
+
+
+@each_module
+def test_everything_public_says_what_it_is(path):
+    tree = parsed(path)
+    silent = [
+        node.name
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+        and not node.name.startswith("_")
+        and not ast.get_docstring(node)
+    ]
+    if tree.body:
+        assert ast.get_docstring(tree), "the module has no docstring"
+    assert silent == []
+
+
+@each_module
+def test_modules_are_read_in_one_sitting(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_MODULE
+
+
+def test_modules_are_named_after_something():
+    names = {part for path in MODULES for part in path.relative_to(PACKAGE).with_suffix("").parts}
+    assert names & NAMES_OF_NOTHING == set()
