@@ -67,16 +67,20 @@ def _denoise(steps: Floats, travelled: Floats) -> Floats:
 
 
 def _haar_threshold(values: Floats, variance: Floats) -> Floats:
-    """Hard threshold of the orthonormal Haar coefficients of each row (s, 2^k), given their noise variance (s, 2^k)."""
+    """Hard threshold of the orthonormal Haar coefficients of each row (s, 2^k), given their noise variance (s, 2^k).
+
+    What stands above a kept coefficient is kept too: without it, a lone pivot would be turned back over the whole run.
+    """
     details: list[Floats] = []
     smooth, smooth_variance = values, variance
+    kept = np.zeros(values.shape, dtype=np.bool_)
     while smooth.shape[1] > 1:
         detail = (smooth[:, ::2] - smooth[:, 1::2]) / np.sqrt(2.0)
         smooth = (smooth[:, ::2] + smooth[:, 1::2]) / np.sqrt(2.0)
         smooth_variance = 0.5 * (smooth_variance[:, ::2] + smooth_variance[:, 1::2])
-        detail[detail**2 < THRESHOLD_SIGMAS**2 * smooth_variance] = 0.0
-        details.append(detail)
-    smooth = np.where(smooth**2 < THRESHOLD_SIGMAS**2 * smooth_variance, 0.0, smooth)
+        kept = kept[:, ::2] | kept[:, 1::2] | (detail**2 >= THRESHOLD_SIGMAS**2 * smooth_variance)
+        details.append(np.where(kept, detail, 0.0))
+    smooth = np.where(kept | (smooth**2 >= THRESHOLD_SIGMAS**2 * smooth_variance), smooth, 0.0)
     for detail in reversed(details):
         finer = np.empty((detail.shape[0], 2 * detail.shape[1]))
         finer[:, ::2] = (smooth + detail) / np.sqrt(2.0)

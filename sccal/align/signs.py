@@ -1,7 +1,7 @@
 """Do yaw, wheels and fixes turn the same way, and do both wheels roll forward? If not, say which setting is wrong.
 
-Three independent witnesses of every turn: the wheels (a_r − a_l over the track), the AHRS, and the course of the fixes.
-Slopes of one on another, over windows long enough for the fixes to show a course, tell which of them is mirrored.
+Three independent witnesses of every turn: the wheels (a_r − a_l over the track), the AHRS, and the path of the fixes.
+The slope of the AHRS on the wheels shows that one of these is mirrored, the path of the fixes which.
 A wheel that counts backwards shows in the distance: the fixes then move by half the *difference* of the two wheels.
 """
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sccal.arrays import Floats
+from sccal.arrays import Complexes, Floats
 from sccal.errors import DataError
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ MIN_TURN_RAD = np.radians(30.0)
 MIN_CORRELATION = 0.5
 MIN_TRAVEL_SIGMAS = 8.0
 MIN_WINDOWS = 8
+STRETCH_RAD = 4.0
+CLEARLY_WORSE = 2.0
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def check_signs(aligned: Aligned) -> None:
     windows = _fix_windows(aligned)
     if windows is not None:
         _check_wheel_directions(aligned, *windows)
-    _check_turning(aligned, windows)
+    _check_turning(aligned)
 
 
 def _wheel_turn(aligned: Aligned, t_s: Floats) -> Floats:
@@ -113,7 +115,7 @@ def _unexplained(x: Floats, y: Floats) -> float:
     return float(((y - slope * x) ** 2).sum() / max((y**2).sum(), 1e-12))
 
 
-def _check_turning(aligned: Aligned, windows: tuple[Floats, Floats, Floats] | None) -> None:
+def _check_turning(aligned: Aligned) -> None:
     start, end = aligned.span_s
     t_s = np.arange(start, end, WINDOW_S)
     if t_s.size < MIN_WINDOWS + 1:
@@ -130,35 +132,48 @@ def _check_turning(aligned: Aligned, windows: tuple[Floats, Floats, Floats] | No
 
     convention = aligned.vehicle.convention
     other = "ned" if convention == "enu" else "enu"
-    course_on_wheels, course_on_yaw = _course_slopes(aligned, windows)
+    wheels_fit = _turns_as_the_fixes_do(aligned, _wheel_turn(aligned, aligned.wheel_t_s))
+    yaw_fits = _turns_as_the_fixes_do(aligned, np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad))
     seen = (
         f"the AHRS yaw turns against the wheels (slope {yaw_on_wheels.value:+.2f}, "
         f"correlation {yaw_on_wheels.correlation:+.2f} over {yaw_on_wheels.windows} s)"
     )
     swapped = "left and right wheels look swapped: exchange left_ticks and right_ticks in encoder.csv"
     mirrored = f'set convention = "{other}" under [ahrs] in vehicle.toml (it is "{convention}")'
-    if course_on_wheels.opposed and course_on_yaw.agreed:
-        raise DataError(f"{seen}, and the course of the fixes sides with the AHRS: {swapped}")
-    if course_on_wheels.agreed and not course_on_yaw.agreed:
-        raise DataError(f"{seen}, and the course of the fixes sides with the wheels: {mirrored}")
+    if wheels_fit is False and yaw_fits is not False:
+        raise DataError(f"{seen}, and the path of the fixes sides with the AHRS: {swapped}")
+    if yaw_fits is False and wheels_fit is not False:
+        raise DataError(f"{seen}, and the path of the fixes sides with the wheels: {mirrored}")
     raise DataError(f"{seen}, and the fixes do not tell which is right: {mirrored}, or, if that was right, {swapped}")
 
 
-def _course_slopes(aligned: Aligned, windows: tuple[Floats, Floats, Floats] | None) -> tuple[Slope, Slope]:
-    """Slopes of the change of course of the fixes on the turning by the wheels, and by the AHRS."""
-    nothing = Slope(0.0, 0.0, 0)
-    if windows is None:
-        return nothing, nothing
-    t_s, east, north = windows
-    course = np.arctan2(np.diff(north), np.diff(east))
-    # A reversal flips the course by half a turn; turning itself does not: compare modulo π.
-    change = np.diff(course)
-    change = change - np.pi * np.round(change / np.pi)
-    middle = 0.5 * (t_s[1:] + t_s[:-1])
-    by_wheels = np.diff(_wheel_turn(aligned, middle))
-    by_yaw = np.diff(np.interp(middle, aligned.heading_t_s, aligned.yaw_rad))
-    small = (np.abs(by_yaw) < 1.2) & (np.abs(by_wheels) < 2.4)
-    return (
-        slope_through_origin(by_wheels[small], change[small]),
-        slope_through_origin(by_yaw[small], change[small]),
-    )
+def _turns_as_the_fixes_do(aligned: Aligned, turn_rad: Floats) -> bool | None:
+    """Whether the wheels' travel laid out along a heading is the fixes' path, or its mirror image; None if unclear.
+
+    A path and its mirror image differ however they are turned, shifted and scaled, so the zero of the heading does not
+    matter, nor does driving in reverse. Stretches are short enough that a wrong track does not bend them out of shape.
+    """
+    middle = 0.5 * (turn_rad[1:] + turn_rad[:-1])
+    path = np.concatenate(([0.0], np.cumsum(np.diff(aligned.travel_m) * np.exp(1j * middle))))
+    fix_t_s = aligned.fix_t_s[aligned.fix_leading]
+    fixes = (aligned.fix_east_m + 1j * aligned.fix_north_m)[aligned.fix_leading]
+    p = np.interp(fix_t_s, aligned.wheel_t_s, path)
+    turned = np.interp(fix_t_s, aligned.wheel_t_s, np.concatenate(([0.0], np.cumsum(np.abs(np.diff(turn_rad))))))
+    as_is = mirrored = 0.0
+    for stretch in np.unique(np.floor(turned / STRETCH_RAD)):
+        rows = np.floor(turned / STRETCH_RAD) == stretch
+        if rows.sum() >= MIN_WINDOWS:
+            as_is += _misfit(p[rows], fixes[rows])
+            mirrored += _misfit(np.conj(p[rows]), fixes[rows])
+    noise = float((aligned.fix_var_east_m2 + aligned.fix_var_north_m2)[aligned.fix_leading].mean())
+    if max(as_is, mirrored) < CLEARLY_WORSE * min(as_is, mirrored) or max(as_is, mirrored) < 10.0 * noise:
+        return None
+    return as_is < mirrored
+
+
+def _misfit(path: Complexes, fixes: Complexes) -> float:
+    """Sum of squares (m²) that turning, shifting and scaling the path leaves unexplained of the fixes."""
+    p, z = path - path.mean(), fixes - fixes.mean()
+    power = float((np.abs(p) ** 2).sum())
+    alpha = (np.conj(p) * z).sum() / power if power > 0 else 0.0
+    return float((np.abs(z - alpha * p) ** 2).sum())

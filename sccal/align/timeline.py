@@ -16,6 +16,8 @@ from sccal.arrays import Floats, Ints, Rows
 
 LOOSE_FRACTION = 0.25
 LOOSE_FLOOR_M = 0.02
+ROUNDING = 0.1
+"""Stamps of a 50 Hz stream rarely have a median step of exactly 0.02 s; a tenth of a step more is the same rate."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ def thin(t_s: Floats, rate_hz: float) -> Ints:
     if t_s.size < 2 or not np.isfinite(rate_hz):
         return np.arange(t_s.size)
     step = float(np.median(np.diff(t_s)))
-    every = max(1, int(np.floor(1.0 / (rate_hz * max(step, 1e-9)) + 0.5)))
+    every = max(1, int(np.ceil(1.0 / (rate_hz * max(step, 1e-9)) - ROUNDING)))
     return np.arange(0, t_s.size, every)
 
 

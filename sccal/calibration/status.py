@@ -39,8 +39,8 @@ def judge(
         elif not factors[k, 0] * nominal[k] < value < factors[k, 1] * nominal[k]:
             status = "at_bound"
             reason = (
-                f"the {names[k]} comes out at {value / nominal[k]:.2f} times its nominal value, beyond what wear or load "
-                "explain: check ticks_per_rev, wheel_radius_m and track_m in vehicle.toml"
+                f"the {names[k]} comes out at {value / nominal[k]:.2f} times its nominal value, beyond what wear or "
+                "load explain: check ticks_per_rev, wheel_radius_m and track_m in vehicle.toml"
             )
         found.append(Estimate(value, float(sigma[k]), status, reason, float(nominal[k]), float(prior[k])))  # type: ignore[arg-type]
     return Parameters(found[0], found[1], found[2], _judge_offset(float(values[3]), float(sigma[3]), options))

@@ -17,7 +17,6 @@ from sccal.filter.kernel import BASE_STATES, Columns, Events, Model, Output
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start
 
-
 NUMERIC_RANGE = 5.0
 
 

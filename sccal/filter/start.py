@@ -8,6 +8,7 @@ the angle is sure, so the zero of the AHRS may be anything and the robot may sta
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ FIRST_WINDOW_S = 10.0
 GROWTH = 1.6
 ENOUGH_RAD = np.radians(1.0)
 MIN_SPREAD_M = 1.0
+HARDLY_M = 0.3
+UNSURE_RAD = 0.7
 CORRELATION_S = 3.0
 HEADING_FLOOR_RAD = np.radians(3.0)
 HUBER = 1.5
@@ -92,11 +95,12 @@ def find_start(aligned: Aligned) -> Start:
         if until >= last:
             break
         length *= GROWTH
-    if fit is None or fit.spread_m < 0.3 or fit.sigma_angle > 0.7:
+    if fit is None or fit.spread_m < HARDLY_M or fit.sigma_angle > UNSURE_RAD:
         total = float(np.abs(np.diff(travel)).sum())
         raise DataError(
-            f"the robot hardly moves: the wheels turn for {total:.2f} m in {last - first:.0f} s, and the fixes do not "
-            "show in which direction; drive at least 10 m"
+            f"the robot hardly moves, or the fixes do not follow it: the wheels travel {total:.2f} m in "
+            f"{last - first:.0f} s, and the fixes do not show in which direction; drive at least 10 m, and check that the "
+            "receiver's positions change"
         )
     offset = -float(np.angle(fit.alpha))
     yaw_first = float(np.interp(first, aligned.heading_t_s, aligned.yaw_rad))
@@ -158,6 +162,7 @@ class _Similarity:
     fix_mean: complex
     rms_m: float
     spread_m: float
+    """Of the path as the fixes show it."""
     sigma_angle: float
 
 
@@ -180,4 +185,5 @@ def _similarity(path: Complexes, fixes: Complexes, sigma_m: Floats, t_s: Floats)
     spread = float(np.sqrt((weight * np.abs(p) ** 2).sum() / total))
     independent = max(2.0, min(path.size / 2.0, float(np.ptp(t_s)) / CORRELATION_S))
     noise = max(rms, float(np.sqrt(1.0 / base.mean())))
-    return _Similarity(alpha, path_mean, fix_mean, rms, spread, noise / (max(spread, 1e-6) * np.sqrt(independent)))
+    moved = abs(alpha) * spread
+    return _Similarity(alpha, path_mean, fix_mean, rms, moved, noise / (max(moved, 1e-6) * math.sqrt(independent)))

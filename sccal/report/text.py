@@ -82,7 +82,15 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
 def _parameter_table(rows: Sequence[Row], width: int) -> list[str]:
     header = ("parameter", "value", "", "unit", "nominal", "change", "status")
     cells = [
-        (row.name, row.value, f"± {row.sigma}" if row.sigma else "", row.unit, row.nominal or "-", row.change or "-", row.status)
+        (
+            row.name,
+            row.value,
+            f"± {row.sigma}" if row.sigma else "",
+            row.unit,
+            row.nominal or "-",
+            row.change or "-",
+            row.status,
+        )
         for row in rows
     ]
     lines = _columns([header, *cells], "<><<>><")

@@ -46,7 +46,7 @@ def test_no_sigma_is_below_the_floor():
     assert sigmas(4, 0.001, 0.02) == pytest.approx((0.008, 0.02, 0.0))
 
 
-@pytest.mark.parametrize(("east_m", "north_m"), [(0.0, 0.0), (-1.0, 0.5), (0.5, np.nan), (np.inf, 0.5)])
+@pytest.mark.parametrize(("east_m", "north_m"), [(0.0, 0.0), (-1.0, 0.5), (0.5, np.nan), (0.5, np.inf), (np.inf, 0.5)])
 def test_a_stated_sigma_that_makes_no_sense_is_not_stated(east_m, north_m):
     assert sigmas(5, east_m, north_m, 0.1) == pytest.approx((0.35, 0.35, 0.0))
 

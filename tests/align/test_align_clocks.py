@@ -149,11 +149,13 @@ def test_without_receive_times_the_logging_clock_is_unix_time():
 
 
 @pytest.mark.parametrize("start_of_day_s", [30.0, 43200.0, 86390.0])
-def test_times_of_day_are_put_on_the_day_of_the_wheels(start_of_day_s):
+@pytest.mark.parametrize("wheels_first_s", [-60.0, 60.0])
+def test_times_of_day_are_put_on_the_day_of_the_wheels(start_of_day_s, wheels_first_s):
     midnight_s = 19875 * 86400.0
     day_s = start_of_day_s + np.arange(100) * 0.2
     stream = fixes(np.full(100, np.nan), day_s, has_date=False)
-    span_s = (midnight_s + start_of_day_s - 5.0, midnight_s + start_of_day_s + 25.0)
+    begin_s = midnight_s + start_of_day_s
+    span_s = (begin_s + min(wheels_first_s, -5.0), begin_s + max(wheels_first_s, 25.0))
     t_s, _, _ = fixes_on_host_clock(stream, span_s)
     assert t_s == pytest.approx(midnight_s + day_s, abs=1e-6)
 

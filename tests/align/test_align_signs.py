@@ -140,6 +140,10 @@ def test_slope_of_a_line(slope, count):
 def test_no_slope_where_nothing_varies_or_too_little_is_known():
     for x, y in ((np.zeros(20), np.ones(20)), (np.ones(20), np.zeros(20)), (np.zeros(0), np.zeros(0))):
         assert not slope_through_origin(x, y).clear
-    assert not slope_through_origin(np.ones(7), np.ones(7)).clear
-    alternating = np.tile([1.0, -1.0], 20)
-    assert not slope_through_origin(np.ones(40), alternating).clear
+    for x in (np.ones(7), -np.ones(7)):
+        few = slope_through_origin(np.ones(7), x)
+        assert (few.clear, few.agreed, few.opposed) == (False, False, False)
+    for tilt in (-0.1, 0.1):
+        vague = slope_through_origin(np.ones(40), np.tile([1.0, -1.0], 20) + tilt)
+        assert vague.value == pytest.approx(tilt)
+        assert (vague.clear, vague.agreed, vague.opposed) == (False, False, False)
