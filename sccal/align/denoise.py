@@ -78,9 +78,9 @@ def _haar_threshold(values: Floats, variance: Floats) -> Floats:
         detail = (smooth[:, ::2] - smooth[:, 1::2]) / np.sqrt(2.0)
         smooth = (smooth[:, ::2] + smooth[:, 1::2]) / np.sqrt(2.0)
         smooth_variance = 0.5 * (smooth_variance[:, ::2] + smooth_variance[:, 1::2])
-        kept = kept[:, ::2] | kept[:, 1::2] | (detail**2 >= THRESHOLD_SIGMAS**2 * smooth_variance)
+        kept = kept[:, ::2] | kept[:, 1::2] | (detail**2 > THRESHOLD_SIGMAS**2 * smooth_variance)
         details.append(np.where(kept, detail, 0.0))
-    smooth = np.where(kept | (smooth**2 >= THRESHOLD_SIGMAS**2 * smooth_variance), smooth, 0.0)
+    smooth = np.where(kept | (smooth**2 > THRESHOLD_SIGMAS**2 * smooth_variance), smooth, 0.0)
     for detail in reversed(details):
         finer = np.empty((detail.shape[0], 2 * detail.shape[1]))
         finer[:, ::2] = (smooth + detail) / np.sqrt(2.0)

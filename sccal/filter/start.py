@@ -99,8 +99,8 @@ def find_start(aligned: Aligned) -> Start:
         total = float(np.abs(np.diff(travel)).sum())
         raise DataError(
             f"the robot hardly moves, or the fixes do not follow it: the wheels travel {total:.2f} m in "
-            f"{last - first:.0f} s, and the fixes do not show in which direction; drive at least 10 m, and check that the "
-            "receiver's positions change"
+            f"{last - first:.0f} s, and the fixes do not show in which direction; drive at least 10 m, and check that "
+            "the receiver's positions change"
         )
     offset = -float(np.angle(fit.alpha))
     yaw_first = float(np.interp(first, aligned.heading_t_s, aligned.yaw_rad))
