@@ -12,6 +12,7 @@ from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.single import calibrate_run
 from sccal.filter.forward import Noise
 from sccal.filter.options import FilterOptions
+from sccal.filter.start import Constants
 from tests.runs import read, written
 
 NAMES = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_rad")
@@ -192,3 +193,17 @@ def test_fixes_that_scatter_more_than_they_say_are_trusted_less(tmp_path):
     assert calibration.noise.fix_scale * 0.015 == pytest.approx(1.0, rel=0.15)
     assert calibration.parameters.radius_right_m.sigma > 1e-4
     assert np.abs(score).max() < 3.5
+
+
+def test_derivatives_from_raw_wheels_would_learn_the_track_from_slip(tmp_path):
+    """Why the derivatives are freed of slip: on a circle the plain ones are sure of a wrong track."""
+    folder = written(tmp_path, "encoder.rate_hz=100", path="circle", duration_s=400, seed=3)
+    calibration, problem = calibrate_run(read(folder), CalibrationOptions(noise=GIVEN))
+    true = truth(folder)[2]
+    raw = problem.timeline.right_rad, problem.timeline.left_rad
+    plain = problem.begun(Constants(*truth(folder)[:3]), None, raw).finish()
+    sigma = np.sqrt(plain.final_covariance[5, 5])
+    track = calibration.parameters.track_m
+    assert (plain.final_state[5] - true) / sigma > 5.0
+    assert abs(track.value - true) / track.sigma < 3.0
+    assert abs(track.value - true) < 0.3 * abs(plain.final_state[5] - true)
