@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -75,9 +76,10 @@ def calibrate_paths(
         try:
             calibration, problem = calibrate_run(read_run(source), options)
             write_calibration(calibration, out / source.name)
-        except SccalError as error:
-            batch.failures.append(Failure(source.name, error))
-            tell(source, error)
+        except Exception as error:
+            known = error if isinstance(error, SccalError) else _as_known(error)
+            batch.failures.append(Failure(source.name, known))
+            tell(source, known)
             continue
         batch.calibrated.append(calibration)
         of_vehicle.setdefault(_identity(calibration.vehicle), []).append((calibration, problem))
@@ -91,6 +93,12 @@ def calibrate_paths(
         write_vehicle(vehicle, out, stem)
         batch.vehicles.append((vehicle, out / f"{stem}.json"))
     return batch
+
+
+def _as_known(error: Exception) -> SccalError:
+    """A bug in one run must not take the others with it: shown in full now, counted as internal at the end."""
+    traceback.print_exception(error)
+    return SccalError(f"internal error ({type(error).__name__}: {error}); please report it with the lines above")
 
 
 def _identity(vehicle: Vehicle) -> tuple[object, ...]:

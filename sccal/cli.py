@@ -123,7 +123,7 @@ def calibrate(
         total = len(batch.failures) + len(batch.calibrated)
         if total > 1:
             print(f"sccal: {len(batch.failures)} of {total} gave no result", file=sys.stderr)
-        raise typer.Exit(int(Exit.DATA))
+        raise typer.Exit(int(max(failure.error.exit_code for failure in batch.failures)))
 
 
 def _tell(source: RunSource, result: Calibration | SccalError) -> None:

@@ -92,7 +92,7 @@ def align(run: Run) -> Aligned:
     simulated = int((fixes.quality[good] == SIMULATOR_QUALITY).sum())
     if simulated:
         notices.append(Notice("gnss", "fixes say they come from a simulator (quality 8)", simulated, "", "warning"))
-    good &= _inside(t_s, span, "gnss", notices)
+    good &= _inside(np.where(good, t_s, np.nan), span, "gnss", notices)
     order = np.argsort(t_s[good], kind="stable")
     good_index = np.flatnonzero(good)[order]
     fresh = np.concatenate(([True], np.diff(t_s[good_index]) > 0)) if good_index.size else np.zeros(0, bool)
@@ -156,7 +156,11 @@ def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStr
             "the streams must overlap for at least some seconds"
         )
     return WheelStream(
-        wheels.t_s[first:], wheels.left_rad[first:], wheels.right_rad[first:], wheels.loose[first:], wheels.extras
+        wheels.t_s[first:],
+        wheels.left_rad[first:],
+        wheels.right_rad[first:],
+        wheels.loose[first:],
+        {name: values[first:] for name, values in wheels.extras.items()},
     )
 
 

@@ -25,6 +25,10 @@ MIN_TRAVEL_SIGMAS = 8.0
 MIN_WINDOWS = 8
 STRETCH_RAD = 4.0
 CLEARLY_WORSE = 2.0
+STUCK_TRAVEL_M = 5.0
+STUCK_SHARE = 0.02
+STUCK_YAW_RAD = np.radians(1.0)
+STUCK_TURN_RAD = np.radians(60.0)
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ def slope_through_origin(x: Floats, y: Floats) -> Slope:
 
 def check_signs(aligned: Aligned) -> None:
     """Raise DataError where a sign is certainly wrong; say nothing where the drive cannot tell."""
+    _check_that_both_wheels_turn(aligned)
     windows = _fix_windows(aligned)
     if windows is not None:
         _check_wheel_directions(aligned, *windows)
@@ -86,6 +91,18 @@ def _fix_windows(aligned: Aligned) -> tuple[Floats, Floats, Floats] | None:
     if chosen.size < MIN_WINDOWS + 1:
         return None
     return aligned.fix_t_s[chosen], aligned.fix_east_m[chosen], aligned.fix_north_m[chosen]
+
+
+def _check_that_both_wheels_turn(aligned: Aligned) -> None:
+    radius = aligned.vehicle.wheel_radius_m
+    right = radius * float(np.abs(np.diff(aligned.right_rad)).sum())
+    left = radius * float(np.abs(np.diff(aligned.left_rad)).sum())
+    if max(right, left) > STUCK_TRAVEL_M and min(right, left) < STUCK_SHARE * max(right, left):
+        side = "right" if right < left else "left"
+        raise DataError(
+            f"encoder.csv: the {side} wheel's counter hardly moves ({min(right, left):.2f} m in all, the other wheel's "
+            f"{max(right, left):.2f} m): check the encoder and the column {side}_ticks"
+        )
 
 
 def _check_wheel_directions(aligned: Aligned, t_s: Floats, east_m: Floats, north_m: Floats) -> None:
@@ -124,6 +141,12 @@ def _check_turning(aligned: Aligned) -> None:
     t_s = t_s[inside]
     wheels = np.diff(_wheel_turn(aligned, t_s))
     yaw = np.diff(np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad))
+    swing, turned = float(np.ptp(aligned.yaw_rad)), float(np.ptp(_wheel_turn(aligned, t_s)))
+    if swing < STUCK_YAW_RAD and turned > STUCK_TURN_RAD:
+        raise DataError(
+            f"ahrs.csv: the yaw stays within {np.degrees(swing):.2f}° while the wheels turn the robot by "
+            f"{np.degrees(turned):.0f}°: the AHRS is stuck, or the wrong column is called yaw"
+        )
     if np.abs(wheels).sum() < MIN_TURN_RAD or np.abs(yaw).sum() < MIN_TURN_RAD:
         return
     yaw_on_wheels = slope_through_origin(wheels, yaw)
@@ -138,7 +161,10 @@ def _check_turning(aligned: Aligned) -> None:
         f"the AHRS yaw turns against the wheels (slope {yaw_on_wheels.value:+.2f}, "
         f"correlation {yaw_on_wheels.correlation:+.2f} over {yaw_on_wheels.windows} s)"
     )
-    swapped = "left and right wheels look swapped: exchange left_ticks and right_ticks in encoder.csv"
+    swapped = (
+        "left and right wheels look swapped: exchange left_ticks and right_ticks in encoder.csv (or, if both count "
+        "backwards, negate both)"
+    )
     mirrored = f'set convention = "{other}" under [ahrs] in vehicle.toml (it is "{convention}")'
     if wheels_fit is False and yaw_fits is not False:
         raise DataError(f"{seen}, and the path of the fixes sides with the AHRS: {swapped}")

@@ -40,6 +40,8 @@ class Noise:
     """estimated or given."""
     other_fix_scale: Mapping[int, float] = field(default_factory=dict)
     """The same factor for fixes of another quality (GGA code to factor)."""
+    fix_stated_m: float = float("nan")
+    """Median of the stated (or table) sigma of the leading fixes, which fix_scale multiplies."""
 
 
 @dataclass(frozen=True)

@@ -344,6 +344,94 @@ def _open_position(x: Floats, P: Floats, nu_e: float, nu_n: float, level: float,
 
 
 @compiled
+def _expect_heading(
+    x: Floats, P: Floats, v: Floats, events: Events, columns: Columns, use_offset: bool, h: int
+) -> tuple[float, float]:
+    """Innovation ν and its variance S of one heading reading; v (n,) becomes P Hᵀ."""
+    n = x.shape[0]
+    predicted = x[2] + x[7]
+    if use_offset:
+        predicted += x[6]
+        for q in range(n):
+            v[q] = P[2, q] + P[6, q] + P[7, q]
+    else:
+        for q in range(n):
+            v[q] = P[2, q] + P[7, q]
+    for k in range(columns.heading_param.shape[0]):
+        c = columns.heading[h, k]
+        j = 10 + columns.heading_param[k]
+        predicted += c * x[j]
+        for q in range(n):
+            v[q] += c * P[j, q]
+    s = events.yaw_var_rad2[h] + v[2] + v[7]
+    if use_offset:
+        s += v[6]
+    for k in range(columns.heading_param.shape[0]):
+        s += columns.heading[h, k] * v[10 + columns.heading_param[k]]
+    return wrap_angle(events.yaw_rad[h] - predicted), s
+
+
+@compiled
+def _fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
+    """East and north derivative of a fix by a parameter whose column value is c."""
+    if port == 0:
+        return c * ct, c * st
+    if port == 1:
+        return -c * st, c * ct
+    if port == 2:
+        return c, 0.0
+    return 0.0, c
+
+
+@compiled
+def _expect_fix(
+    x: Floats, P: Floats, v: Floats, w: Floats, events: Events, columns: Columns, f: int, antenna: Floats
+) -> tuple[float, float, float, float, float]:
+    """Innovations east and north, S_ee, S_nn, S_en of one fix; v and w (n,) become P H_eᵀ and P H_nᵀ."""
+    n = x.shape[0]
+    kf = columns.fix_param.shape[0]
+    ct = math.cos(x[2])
+    st = math.sin(x[2])
+    arm_forward, arm_left, shift_e, shift_n = 0.0, 0.0, 0.0, 0.0
+    for k in range(kf):
+        pc = columns.fix[f, k] * x[10 + columns.fix_param[k]]
+        port = columns.fix_port[k]
+        if port == 0:
+            arm_forward += pc
+        elif port == 1:
+            arm_left += pc
+        elif port == 2:
+            shift_e += pc
+        else:
+            shift_n += pc
+    antenna[f, 0] = x[0] + ct * arm_forward - st * arm_left + shift_e
+    antenna[f, 1] = x[1] + st * arm_forward + ct * arm_left + shift_n
+    nu_e = events.fix_east_m[f] - antenna[f, 0] - x[8]
+    nu_n = events.fix_north_m[f] - antenna[f, 1] - x[9]
+    he = -(st * arm_forward + ct * arm_left)
+    hn = ct * arm_forward - st * arm_left
+    for q in range(n):
+        v[q] = P[0, q] + he * P[2, q] + P[8, q]
+        w[q] = P[1, q] + hn * P[2, q] + P[9, q]
+    for k in range(kf):
+        j = 10 + columns.fix_param[k]
+        ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
+        for q in range(n):
+            v[q] += ce * P[j, q]
+            w[q] += cn * P[j, q]
+    see = events.fix_var_east_m2[f] + v[0] + he * v[2] + v[8]
+    snn = events.fix_var_north_m2[f] + w[1] + hn * w[2] + w[9]
+    sen = events.fix_cov_m2[f] + w[0] + he * w[2] + w[8]
+    for k in range(kf):
+        j = 10 + columns.fix_param[k]
+        ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
+        see += ce * v[j]
+        snn += cn * w[j]
+        sen += ce * w[j]
+    return nu_e, nu_n, see, snn, sen
+
+
+@compiled
 def forward(
     events: Events,
     columns: Columns,
@@ -364,8 +452,6 @@ def forward(
     work = np.zeros((6, n))
     v = np.empty(n)
     w = np.empty(n)
-    kh = columns.heading_param.shape[0]
-    kf = columns.fix_param.shape[0]
     log_outlier_heading = math.log(OUTLIER_FRACTION / TWO_PI)
     log_outlier_fix = math.log(OUTLIER_FRACTION / OUTLIER_AREA_M2)
     log_inlier = math.log(1.0 - OUTLIER_FRACTION)
@@ -411,26 +497,7 @@ def forward(
                     last_dt_h = dth
                 _decay(x, P, 7, factor_h, model.heading_coloured_var)
             memory[0] = t
-            predicted = x[2] + x[7]
-            if model.use_offset:
-                predicted += x[6]
-                for q in range(n):
-                    v[q] = P[2, q] + P[6, q] + P[7, q]
-            else:
-                for q in range(n):
-                    v[q] = P[2, q] + P[7, q]
-            for k in range(kh):
-                c = columns.heading[h, k]
-                j = 10 + columns.heading_param[k]
-                predicted += c * x[j]
-                for q in range(n):
-                    v[q] += c * P[j, q]
-            s = events.yaw_var_rad2[h] + v[2] + v[7]
-            if model.use_offset:
-                s += v[6]
-            for k in range(kh):
-                s += columns.heading[h, k] * v[10 + columns.heading_param[k]]
-            nu = wrap_angle(events.yaw_rad[h] - predicted)
+            nu, s = _expect_heading(x, P, v, events, columns, model.use_offset, h)
             nis = nu * nu / s
             inlier = log_inlier - 0.5 * (nis + math.log(TWO_PI * s))
             weight = 1.0
@@ -475,47 +542,7 @@ def forward(
                 _decay(x, P, 8, factor_f, model.fix_coloured_var)
                 _decay(x, P, 9, factor_f, model.fix_coloured_var)
             memory[1] = t
-            ct = math.cos(x[2])
-            st = math.sin(x[2])
-            arm_forward, arm_left, shift_e, shift_n = 0.0, 0.0, 0.0, 0.0
-            for k in range(kf):
-                pc = columns.fix[f, k] * x[10 + columns.fix_param[k]]
-                port = columns.fix_port[k]
-                if port == 0:
-                    arm_forward += pc
-                elif port == 1:
-                    arm_left += pc
-                elif port == 2:
-                    shift_e += pc
-                else:
-                    shift_n += pc
-            antenna_e = x[0] + ct * arm_forward - st * arm_left + shift_e
-            antenna_n = x[1] + st * arm_forward + ct * arm_left + shift_n
-            out.antenna[f, 0] = antenna_e
-            out.antenna[f, 1] = antenna_n
-            nu_e = events.fix_east_m[f] - antenna_e - x[8]
-            nu_n = events.fix_north_m[f] - antenna_n - x[9]
-            he = -(st * arm_forward + ct * arm_left)
-            hn = ct * arm_forward - st * arm_left
-            for q in range(n):
-                v[q] = P[0, q] + he * P[2, q] + P[8, q]
-                w[q] = P[1, q] + hn * P[2, q] + P[9, q]
-            for k in range(kf):
-                c = columns.fix[f, k]
-                j = 10 + columns.fix_param[k]
-                ce, cn = _fix_row(columns.fix_port[k], c, ct, st)
-                for q in range(n):
-                    v[q] += ce * P[j, q]
-                    w[q] += cn * P[j, q]
-            see = events.fix_var_east_m2[f] + v[0] + he * v[2] + v[8]
-            snn = events.fix_var_north_m2[f] + w[1] + hn * w[2] + w[9]
-            sen = events.fix_cov_m2[f] + w[0] + he * w[2] + w[8]
-            for k in range(kf):
-                j = 10 + columns.fix_param[k]
-                ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
-                see += ce * v[j]
-                snn += cn * w[j]
-                sen += ce * w[j]
+            nu_e, nu_n, see, snn, sen = _expect_fix(x, P, v, w, events, columns, f, out.antenna)
             ratio = sen / see
             s_n = snn - sen * ratio
             rest_n = nu_n - ratio * nu_e
@@ -571,15 +598,3 @@ def forward(
             for q in range(7):
                 out.state[m, q] = x[q]
                 out.sigma[m, q] = math.sqrt(max(P[q, q], 0.0))
-
-
-@compiled
-def _fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
-    """East and north derivative of a fix by a parameter whose column value is c."""
-    if port == 0:
-        return c * ct, c * st
-    if port == 1:
-        return -c * st, c * ct
-    if port == 2:
-        return c, 0.0
-    return 0.0, c

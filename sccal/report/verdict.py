@@ -7,15 +7,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from sccal.calibration.result import Calibration, Estimate, Fit, Parameters, VehicleCalibration
+from sccal.calibration.result import Calibration, Estimate, Fit, Noise, Parameters, VehicleCalibration
 from sccal.report.numbers import short
 from sccal.report.rows import parameter_rows
 
 NIS_LOW = 0.3
 NIS_HIGH = 3.0
 """Between these the stated noise explains the innovations; outside, every sigma is off by more than about √3."""
-REJECTED_MOST = 0.2
+REJECTED_MOST = 0.1
 """Share of measurements that may be rejected before the accepted ones stop being the rule."""
+FIX_WANDER_MOST = 5.0
+"""Correlated fix error over the stated sigma: beyond, it is hardly the receiver that wanders."""
+HEADING_WANDER_MOST_DEG = 3.0
+"""Correlated heading error: beyond, iron near the compass or a wrong clock is likelier than the AHRS itself."""
 CONSISTENCY_HIGH = 3.0
 """χ² per degree of freedom of the runs about the shared parameters."""
 
@@ -35,7 +39,8 @@ class Verdict:
 
 def run_verdict(calibration: Calibration) -> Verdict:
     """Of one run."""
-    return _verdict(calibration.parameters, calibration.fit, calibration.with_offset, ())
+    doubts = _noise_doubts(calibration.noise)
+    return _verdict(calibration.parameters, calibration.fit, calibration.with_offset, doubts)
 
 
 def vehicle_verdict(vehicle: VehicleCalibration) -> Verdict:
@@ -95,4 +100,22 @@ def _fit_doubts(fit: Fit) -> list[str]:
             doubts.append(f"{100.0 * rejected / (used + rejected):.0f} % of the {what} rejected")
         if used and not NIS_LOW <= nis <= NIS_HIGH:
             doubts.append(f"{what} do not fit their noise (NIS {short(nis, 3)}, consistent is 1)")
+    if fit.recoveries:
+        times = "once" if fit.recoveries == 1 else f"{fit.recoveries} times"
+        doubts.append(f"measurements left the prediction for good {times}")
+    return doubts
+
+
+def _noise_doubts(noise: Noise) -> list[str]:
+    doubts = []
+    if noise.fix_coloured_m > FIX_WANDER_MOST * noise.fix_stated_m:
+        doubts.append(
+            f"fixes wander by {short(noise.fix_coloured_m, 2)} m about the model, stated are "
+            f"{short(noise.fix_stated_m, 2)} m: receiver, antenna place or clocks"
+        )
+    wander_deg = math.degrees(noise.heading_coloured_rad)
+    if wander_deg > HEADING_WANDER_MOST_DEG:
+        doubts.append(
+            f"heading wanders by {short(wander_deg, 2)} deg about the model: iron near the compass, or a clock"
+        )
     return doubts

@@ -62,21 +62,12 @@ def test_receive_jitter_is_removed(duration_s, rate_hz, seed):
     assert clock.jitter_s == pytest.approx(0.005, rel=0.3)
 
 
-def test_a_stable_clock_gets_a_straight_line():
-    clocks = [fixes_on_host_clock(received(epochs(), seed), SPAN_S)[2] for seed in range(20)]
+@pytest.mark.parametrize(("duration_s", "rate_hz"), [(80.0, 5.0), (600.0, 1.0), (600.0, 5.0)])
+def test_a_stable_clock_gets_a_straight_line(duration_s, rate_hz):
+    clocks = [fixes_on_host_clock(received(epochs(duration_s, rate_hz), seed), SPAN_S)[2] for seed in range(20)]
     straight = [clock for clock in clocks if clock.knots == 2]
-    assert len(straight) >= 17
-    assert max(abs(clock.skew_ppm) for clock in straight) < 5.0
-
-
-@pytest.mark.xfail(
-    strict=True,
-    reason="at 1 Hz a stable clock is given up to eleven corners in one run of five: the criterion takes the robust "
-    "spread of the residuals for their likelihood, and that spread is itself uncertain by more than a corner costs",
-)
-def test_a_stable_clock_is_not_called_steered_at_1_hz():
-    corners = [fixes_on_host_clock(received(epochs(600.0, 1.0), seed), SPAN_S)[2].knots for seed in range(20)]
-    assert sum(count > 2 for count in corners) <= 2
+    assert len(straight) >= 18
+    assert max(abs(clock.skew_ppm) for clock in straight) * duration_s < 3000.0
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -85,9 +85,7 @@ def test_outliers_do_not_turn_the_start(simulate, streams):
 
 def test_a_robot_that_stands_is_refused(simulate, streams):
     aligned = align(streams(simulate(path="straight", stand_first_s=60.0, duration_s=60.0)))
-    with pytest.raises(
-        DataError, match=r"the robot hardly moves: the wheels turn for 0\.00 m in \d+ s.*drive at least"
-    ):
+    with pytest.raises(DataError, match=r"the robot hardly moves.* 0\.00 m in \d+ s.*drive at least"):
         find_start(aligned)
 
 
@@ -113,15 +111,10 @@ def test_a_robot_that_only_spins_is_refused(simulate, streams):
         find_start(spinning)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the angle's sigma counts the spread of the wheels' path only: against fixes that never move, the angle "
-    "means nothing but is called sure, and the scale is zero",
-)
 def test_a_receiver_that_froze_is_refused(simulate, streams):
     aligned = align(streams(simulate()))
     frozen = replace(aligned, fix_east_m=np.zeros(aligned.fix_t_s.size), fix_north_m=np.zeros(aligned.fix_t_s.size))
-    with pytest.raises(DataError):
+    with pytest.raises(DataError, match="the fixes do not"):
         find_start(frozen)
 
 

@@ -126,7 +126,7 @@ def test_outputs_stand_on_whole_multiples(aligned_by_hand):
     st.floats(0.5, 100.0),
     st.integers(2, 400),
 )
-def test_thinning_keeps_order_and_about_the_rate(stream_hz, asked_hz, count):
+def test_thinning_keeps_order_and_hardly_more_than_the_rate(stream_hz, asked_hz, count):
     t_s = np.arange(count) / stream_hz
     index = thin(t_s, asked_hz)
     assert index[0] == 0
@@ -134,8 +134,8 @@ def test_thinning_keeps_order_and_about_the_rate(stream_hz, asked_hz, count):
     assert np.unique(np.diff(index)).size <= 1
     if index.size > 1:
         kept_hz = 1.0 / (t_s[index[1]] - t_s[index[0]])
-        assert kept_hz <= 1.5 * asked_hz * (1 + 1e-9) or asked_hz > stream_hz
-        assert kept_hz >= min(stream_hz, asked_hz) / 1.5 * (1 - 1e-9)
+        assert kept_hz <= 1.12 * asked_hz
+        assert kept_hz >= min(stream_hz, asked_hz) / 2.0 * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(("stream_hz", "kept_hz"), [(50.0, 10.0), (100.0, 10.0), (10.0, 10.0), (5.0, 5.0)])
@@ -149,11 +149,6 @@ def test_jitter_does_not_halve_a_stream_at_the_rate_asked_for():
     assert thin(t_s, 10.0).size == 200
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the step is rounded to the nearest, so up to half as many readings again as asked for are kept, where the "
-    "docstring and --heading-rate promise at most the rate",
-)
 @pytest.mark.parametrize("stream_hz", [12.5, 14.0, 24.0])
 def test_thinning_keeps_at_most_the_rate(stream_hz):
     t_s = np.arange(400) / stream_hz
