@@ -15,7 +15,7 @@ import sccal
 PACKAGE = Path(sccal.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
-    {"errors", "arrays"},
+    {"errors", "arrays", "compiled"},
     {"geodesy", "logs"},
     {"align"},
     {"effects"},

@@ -5,20 +5,27 @@ they slip. A filter that takes every such wiggle of the wheels for a turn sees t
 concludes that turns by the wheels mean little, and grows a track that is too wide, with a sigma that is too small: the
 classical attenuation by errors in the regressor. On a straight line it would "measure" the track out of slip alone.
 
-Prediction keeps the raw wheel angles. Only the derivatives by R_r, R_l and L use the motion that stands out of the
-noise: sum and difference of the wheels' travel, thresholded in Haar wavelets averaged over shifts (Donoho and Johnstone
-1994; Coifman and Donoho 1995), the noise level per root of distance taken from the finest scale.
+Prediction keeps the raw wheel angles. Only the derivatives by R_r, R_l and L, and the weights of the slip, use the
+motion that stands out of the noise: sum and difference of the wheels' travel as piecewise constant shares of the
+distance travelled (straight lines, arcs and pivots are exactly that, at any speed), segmented by penalised least
+squares (optimal partitioning, Jackson et al. 2005), and zero where a segment's share is not clear of the noise. The
+noise level per root of distance comes from differences of neighbouring steps.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sccal.arrays import Floats
+from sccal.arrays import Floats, Ints
+from sccal.compiled import compiled
 
 GRID_S = 0.1
-SHIFTS = 8
-THRESHOLD_SIGMAS = 5.0
+PENALTY = 25.0
+"""Cost of one more segment in units of χ²: a change must show at 5 σ."""
+CLEAR_SIGMAS = 4.0
+LONGEST = 600
+"""Steps of one segment at most: bounds the work; a minute is long enough to average slip away."""
+FEWEST_STEPS = 8
 NORMAL_MAD = 1.4826
 
 
@@ -27,9 +34,8 @@ def denoised_angles(
 ) -> tuple[Floats, Floats, Floats]:
     """Every k-th time of the wheels (g,) and the cumulative right and left angles there, freed of noise.
 
-    On samples, not between them: interpolation would make neighbouring steps share noise.
-
-    right_over_left is R_r/R_l as far as known: with it, straight driving has no turn at any speed.
+    On samples, not between them: interpolation would make neighbouring steps share noise. right_over_left is R_r/R_l
+    as far as known: with it, straight driving has no turn at any speed.
     """
     every = max(round(GRID_S / float(np.median(np.diff(wheel_t_s)))), 1)
     chosen = np.append(np.arange(0, wheel_t_s.size - 1, every), wheel_t_s.size - 1)
@@ -48,42 +54,52 @@ def denoised_angles(
 
 
 def _denoise(steps: Floats, travelled: Floats) -> Floats:
-    """Steps (g,) with their noise, of variance proportional to the distance travelled, thresholded away."""
-    scaled = np.diff(steps)[::2]
-    base = (travelled[:-1] + travelled[1:])[: scaled.size * 2 : 2]
-    moving = base > 0
-    if moving.sum() < 8:
+    """Steps (g,) as piecewise constant shares of the distance travelled, where these stand out of the noise."""
+    moving = travelled > 0
+    x, d = steps[moving], travelled[moving]
+    if x.size < FEWEST_STEPS:
         return steps
-    level = NORMAL_MAD * float(np.median(np.abs(scaled[moving]) / np.sqrt(base[moving])))
-    size = 1 << int(np.ceil(np.log2(steps.size)))
-    shifts = (np.arange(SHIFTS) * size) // SHIFTS + np.arange(SHIFTS)
-    rows = (np.arange(size)[None, :] - shifts[:, None]) % size
-    padded = np.zeros((2, size))
-    padded[0, : steps.size] = steps
-    padded[1, : steps.size] = level**2 * travelled
-    kept = _haar_threshold(padded[0][rows], padded[1][rows])
-    back = (np.arange(steps.size)[None, :] + shifts[:, None]) % size
-    return np.asarray(np.take_along_axis(kept, back, axis=1).mean(axis=0))
+    rough = np.diff(x / d) / np.sqrt(1.0 / d[1:] + 1.0 / d[:-1])
+    level2 = max(NORMAL_MAD * float(np.median(np.abs(rough))), 1e-12) ** 2
+    bounds = np.append(_segments(x, d, level2, PENALTY, LONGEST), x.size)
+    total, length = np.add.reduceat(x, bounds[:-1]), np.add.reduceat(d, bounds[:-1])
+    share = np.where(total**2 > CLEAR_SIGMAS**2 * level2 * length, total / length, 0.0)
+    clear = np.zeros(steps.size)
+    clear[moving] = np.repeat(share, np.diff(bounds)) * d
+    return clear
 
 
-def _haar_threshold(values: Floats, variance: Floats) -> Floats:
-    """Hard threshold of the orthonormal Haar coefficients of each row (s, 2^k), given their noise variance (s, 2^k).
+@compiled
+def _segments(x: Floats, d: Floats, level2: float, penalty: float, longest: int) -> Ints:
+    """First indices of the segments that minimise Σ (x − κ d)²/(level2 d) + penalty per segment (dynamic programming).
 
-    What stands above a kept coefficient is kept too: without it, a lone pivot would be turned back over the whole run.
+    The sum of a segment's cost is −(Σx)²/(level2 Σd) up to a constant, so cumulative sums give it at once.
     """
-    details: list[Floats] = []
-    smooth, smooth_variance = values, variance
-    kept = np.zeros(values.shape, dtype=np.bool_)
-    while smooth.shape[1] > 1:
-        detail = (smooth[:, ::2] - smooth[:, 1::2]) / np.sqrt(2.0)
-        smooth = (smooth[:, ::2] + smooth[:, 1::2]) / np.sqrt(2.0)
-        smooth_variance = 0.5 * (smooth_variance[:, ::2] + smooth_variance[:, 1::2])
-        kept = kept[:, ::2] | kept[:, 1::2] | (detail**2 > THRESHOLD_SIGMAS**2 * smooth_variance)
-        details.append(np.where(kept, detail, 0.0))
-    smooth = np.where(kept | (smooth**2 > THRESHOLD_SIGMAS**2 * smooth_variance), smooth, 0.0)
-    for detail in reversed(details):
-        finer = np.empty((detail.shape[0], 2 * detail.shape[1]))
-        finer[:, ::2] = (smooth + detail) / np.sqrt(2.0)
-        finer[:, 1::2] = (smooth - detail) / np.sqrt(2.0)
-        smooth = finer
-    return smooth
+    n = x.shape[0]
+    cx = np.zeros(n + 1)
+    cd = np.zeros(n + 1)
+    for i in range(n):
+        cx[i + 1] = cx[i] + x[i]
+        cd[i + 1] = cd[i] + d[i]
+    best = np.zeros(n + 1)
+    came_from = np.zeros(n + 1, dtype=np.int64)
+    for end in range(1, n + 1):
+        best[end] = np.inf
+        for begin in range(max(0, end - longest), end):
+            sum_x = cx[end] - cx[begin]
+            cost = best[begin] - sum_x * sum_x / (level2 * (cd[end] - cd[begin])) + penalty
+            if cost < best[end]:
+                best[end] = cost
+                came_from[end] = begin
+    count = 0
+    at = n
+    while at > 0:
+        at = came_from[at]
+        count += 1
+    first = np.empty(count, dtype=np.int64)
+    at = n
+    while at > 0:
+        at = came_from[at]
+        count -= 1
+        first[count] = at
+    return first

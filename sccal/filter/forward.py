@@ -11,9 +11,19 @@ import numpy as np
 
 from sccal.align import Aligned, Timeline
 from sccal.arrays import Bools, Floats
+from sccal.compiled import is_compiled
 from sccal.filter import kernel
-from sccal.filter.compiled import is_compiled
-from sccal.filter.kernel import BASE_STATES, Columns, Events, Model, Output
+from sccal.filter.layout import (
+    BASE_STATES,
+    MEM_FIX_T,
+    MEM_RECOVERIES,
+    MEMORY_SIZE,
+    REPORTED_STATES,
+    Columns,
+    Events,
+    Model,
+    Output,
+)
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start
 
@@ -100,7 +110,7 @@ class Filter:
         self.output = self.make_output(with_states=True)
         self.x = np.zeros(self.states)
         self.P = np.zeros((self.states, self.states))
-        self.memory = np.zeros(kernel.MEMORY_SIZE)
+        self.memory = np.zeros(MEMORY_SIZE)
         self.position = 0
 
     def make_output(self, with_states: bool) -> Output:
@@ -109,8 +119,8 @@ class Filter:
         m = self.timeline.out_t_s.size if with_states else 0
         nan = np.full
         return Output(
-            state=np.zeros((m, kernel.REPORTED_STATES)),
-            sigma=np.zeros((m, kernel.REPORTED_STATES)),
+            state=np.zeros((m, REPORTED_STATES)),
+            sigma=np.zeros((m, REPORTED_STATES)),
             heading_nu=nan(h, np.nan),
             heading_var=nan(h, np.nan),
             heading_ok=np.zeros(h, dtype=np.bool_),
@@ -138,7 +148,7 @@ class Filter:
         self.P[:] = np.diag(variance)
         self.P[3:6, 3:6] = prior
         self.memory[:] = 0.0
-        self.memory[: kernel.MEM_FIX_T + 1] = self.events.t_s[0]
+        self.memory[: MEM_FIX_T + 1] = self.events.t_s[0]
         self.output.total[:] = 0.0
         self.position = 0
 
@@ -184,7 +194,7 @@ class Filter:
             fix_nu_m=out.fix_nu,
             fix_var_m2=out.fix_var,
             fix_accepted=out.fix_ok,
-            recoveries=int(self.memory[kernel.MEM_RECOVERIES]),
+            recoveries=int(self.memory[MEM_RECOVERIES]),
             nll_heading=float(out.total[0]),
             nll_fix=float(out.total[1]),
         )

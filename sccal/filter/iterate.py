@@ -19,6 +19,8 @@ from sccal.filter.start import Constants, Start, first_constants
 
 MAX_ROUNDS = 6
 CLOSE_SIGMAS = 0.05
+SAME_RATIO = 1e-4
+"""R_r/R_l known so well leaves less turn in a straight line than slip does."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,12 @@ def iterate(problem: RunProblem, first: Constants, max_rounds: int = MAX_ROUNDS)
     information = np.linalg.inv(prior_covariance(problem.centre, problem.options))
     lower, upper = numeric_limits(problem.centre)
     at = np.clip(first.as_array(), lower, upper)
+    clear, ratio = None, np.inf
     for _ in range(max_rounds):
         constants = Constants(*(float(v) for v in at))
-        found = problem.begun(constants, linear_at=constants).finish()
+        if clear is None or abs(at[0] / at[1] - ratio) > SAME_RATIO:
+            clear, ratio = problem.clear_steps(constants), float(at[0] / at[1])
+        found = problem.begun(constants, constants, clear).finish()
         covariance = found.final_covariance[3:7, 3:7]
         mode = found.final_state[3:7] + covariance[:, :3] @ information @ (centre - at)
         mode[:3] = np.clip(mode[:3], lower, upper)

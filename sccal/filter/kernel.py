@@ -21,7 +21,7 @@ The derivatives by the constants may be taken at fixed values of them: a running
 believe that it has seen directions of the parameter space that the drive never showed (Huang, Mourikis and Roumeliotis
 2008, on first-estimates Jacobians). They use the wheels' motion freed of slip (see sccal.align.denoise).
 
-Process noise enters by the two wheels: variance slip² |a| + the event's own extra variance.
+Process noise enters by the two wheels: variance slip² |R φ| + the event's own extra variance.
 
 Measurements::
 
@@ -36,97 +36,38 @@ scalar ones after decorrelation, so both are linearised at the same state.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from sccal.arrays import Bools, Floats, Rows
-from sccal.filter.compiled import compiled
-
-X, Y, THETA, RADIUS_RIGHT, RADIUS_LEFT, TRACK, OFFSET, HEADING_BIAS, EAST_BIAS, NORTH_BIAS = range(10)
-BASE_STATES = 10
-REPORTED_STATES = 7
-
-PORT_ALONG, PORT_SIDE, PORT_TURN, PORT_RIGHT_WHEEL, PORT_LEFT_WHEEL = range(5)
-PORT_ANTENNA_FORWARD, PORT_ANTENNA_LEFT, PORT_EAST, PORT_NORTH = range(4)
-
-# What a forward pass carries from one call to the next, beside state and covariance.
-MEM_HEADING_T, MEM_FIX_T, MEM_FIX_REJECTED, MEM_FIX_SINCE, MEM_HEADING_REJECTED, MEM_HEADING_SINCE = range(6)
-MEM_RECOVERIES, MEM_FIX_LEVEL, MEM_ACCEPTED_SINCE = 6, 7, 8
-MEMORY_SIZE = 9
+from sccal.arrays import Floats
+from sccal.compiled import compiled
+from sccal.filter.layout import (
+    BASE_STATES,
+    MEM_ACCEPTED_SINCE,
+    MEM_FIX_LEVEL,
+    MEM_FIX_REJECTED,
+    MEM_FIX_SINCE,
+    MEM_FIX_T,
+    MEM_HEADING_REJECTED,
+    MEM_HEADING_SINCE,
+    MEM_HEADING_T,
+    MEM_RECOVERIES,
+    PORT_ALONG,
+    PORT_ANTENNA_FORWARD,
+    PORT_ANTENNA_LEFT,
+    PORT_EAST,
+    PORT_RIGHT_WHEEL,
+    PORT_SIDE,
+    PORT_TURN,
+    Columns,
+    Events,
+    Model,
+    Output,
+)
 
 TWO_PI = 2.0 * math.pi
 OUTLIER_FRACTION = 0.01
 OUTLIER_AREA_M2 = 1.0e4
-
-
-class Events(NamedTuple):
-    """One timeline, n events in order of time (see sccal.align.Timeline)."""
-
-    t_s: Floats  # (n,)
-    right_rad: Floats  # (n,) wheel angle since the event before
-    left_rad: Floats  # (n,)
-    right_clear_rad: Floats  # (n,) the same without slip: for the derivatives by R_r, R_l, L
-    left_clear_rad: Floats  # (n,)
-    loose_m2: Floats  # (n,) extra variance of each wheel's travel, m²
-    heading_row: Rows  # (n,) int32, row of the heading reading here, or -1
-    fix_row: Rows  # (n,) int32
-    out_row: Rows  # (n,) int32, row of the output to fill here, or -1
-    yaw_rad: Floats  # (h,) AHRS reading turned into enu
-    yaw_var_rad2: Floats  # (h,) white part
-    fix_east_m: Floats  # (f,)
-    fix_north_m: Floats  # (f,)
-    fix_var_east_m2: Floats  # (f,) white part
-    fix_var_north_m2: Floats  # (f,)
-    fix_cov_m2: Floats  # (f,)
-
-
-class Columns(NamedTuple):
-    """Effect columns by the room they act in; ``param`` counts from 0 and adds BASE_STATES to give the state."""
-
-    motion: Floats  # (n, km), rows as Events.t_s
-    motion_port: Rows  # (km,) int32
-    motion_param: Rows  # (km,) int32
-    heading: Floats  # (h, kh), rad per unit of the parameter
-    heading_param: Rows  # (kh,) int32
-    fix: Floats  # (f, kf)
-    fix_port: Rows  # (kf,) int32
-    fix_param: Rows  # (kf,) int32
-
-
-class Model(NamedTuple):
-    """Everything that is a number: noise, walks, gates."""
-
-    slip2: float  # m² per m of each wheel
-    heading_coloured_var: float  # rad²
-    heading_tau_s: float
-    fix_coloured_var: float  # m²
-    fix_tau_s: float
-    walk: Floats  # (n,) variance rate of each state, unit² per s (parameters only)
-    linear: Floats  # (3,) R_r, R_l, L at which their derivatives are taken; not positive: at the current estimate
-    lower: Floats  # (3,) bounds of R_r, R_l, L
-    upper: Floats  # (3,)
-    heading_gate: float  # χ² with 1 degree of freedom
-    fix_gate: float  # χ² with 2 degrees of freedom
-    soft_gate: bool  # instead of the gates: weigh each measurement by its probability of being no outlier
-    recover_count: float  # rejected in a row …
-    recover_s: float  # … for so long: the filter opens up again
-    use_offset: bool
-
-
-class Output(NamedTuple):
-    """What a pass fills; rows of one call range are written, the others left."""
-
-    state: Floats  # (m, REPORTED_STATES)
-    sigma: Floats  # (m, REPORTED_STATES)
-    heading_nu: Floats  # (h,) rad, NaN where not reached
-    heading_var: Floats  # (h,) innovation variance S
-    heading_ok: Bools  # (h,) bool, accepted
-    fix_nu: Floats  # (f, 2) m
-    fix_var: Floats  # (f, 3) S_ee, S_nn, S_en
-    fix_ok: Bools  # (f,) bool
-    antenna: Floats  # (f, 2) m, predicted antenna (without the fix-error states)
-    total: Floats  # (2,) negative log-likelihood: heading, fixes
 
 
 @compiled
@@ -161,33 +102,33 @@ def _move(
     inv_track = 1.0 / x[5]
     for k in range(km):
         c = columns.motion[row, k]
-        j = 10 + columns.motion_param[k]
+        j = BASE_STATES + columns.motion_param[k]
         gs[j] = 0.0
         gt[j] = 0.0
         gd[j] = 0.0
         pc = x[j] * c
         port = columns.motion_port[k]
-        if port == 0:
+        if port == PORT_ALONG:
             along += pc
-        elif port == 1:
+        elif port == PORT_SIDE:
             side += pc
-        elif port == 2:
+        elif port == PORT_TURN:
             turn += pc
-        elif port == 3:
+        elif port == PORT_RIGHT_WHEEL:
             along_right += pc
         else:
             along_left += pc
     for k in range(km):
         c = columns.motion[row, k]
-        j = 10 + columns.motion_param[k]
+        j = BASE_STATES + columns.motion_param[k]
         port = columns.motion_port[k]
-        if port == 0:
+        if port == PORT_ALONG:
             gs[j] += c
-        elif port == 1:
+        elif port == PORT_SIDE:
             gd[j] += c
-        elif port == 2:
+        elif port == PORT_TURN:
             gt[j] += c
-        elif port == 3:
+        elif port == PORT_RIGHT_WHEEL:
             gs[j] += 0.5 * c
             gt[j] += c * inv_track
         else:
@@ -219,7 +160,7 @@ def _move(
         T[q] = gt3 * P[3, q] + gt4 * P[4, q] + gt5 * P[5, q]
         D[q] = 0.0
     for k in range(km):
-        j = 10 + columns.motion_param[k]
+        j = BASE_STATES + columns.motion_param[k]
         first = True
         for before in range(k):
             if columns.motion_param[before] == columns.motion_param[k]:
@@ -241,7 +182,7 @@ def _move(
         gti = gt3 * P[i, 3] + gt4 * P[i, 4] + gt5 * P[i, 5]
         gdi = 0.0
         for k in range(km):
-            j = 10 + columns.motion_param[k]
+            j = BASE_STATES + columns.motion_param[k]
             first = True
             for before in range(k):
                 if columns.motion_param[before] == columns.motion_param[k]:
@@ -258,8 +199,9 @@ def _move(
     P[2, 0] = P[0, 2]
     P[2, 1] = P[1, 2]
 
-    var_right = slip2 * abs(along_right) + loose
-    var_left = slip2 * abs(along_left) + loose
+    # By the motion freed of slip: weights that grow with the slip itself would favour what slipped forward.
+    var_right = slip2 * abs(at_right * right_clear) + loose
+    var_left = slip2 * abs(at_left * left_clear) + loose
     qss = 0.25 * (var_right + var_left)
     qtt = (var_right + var_left) * inv_track * inv_track
     qst = 0.5 * (var_right - var_left) * inv_track
@@ -359,7 +301,7 @@ def _expect_heading(
             v[q] = P[2, q] + P[7, q]
     for k in range(columns.heading_param.shape[0]):
         c = columns.heading[h, k]
-        j = 10 + columns.heading_param[k]
+        j = BASE_STATES + columns.heading_param[k]
         predicted += c * x[j]
         for q in range(n):
             v[q] += c * P[j, q]
@@ -367,18 +309,18 @@ def _expect_heading(
     if use_offset:
         s += v[6]
     for k in range(columns.heading_param.shape[0]):
-        s += columns.heading[h, k] * v[10 + columns.heading_param[k]]
+        s += columns.heading[h, k] * v[BASE_STATES + columns.heading_param[k]]
     return wrap_angle(events.yaw_rad[h] - predicted), s
 
 
 @compiled
 def _fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
     """East and north derivative of a fix by a parameter whose column value is c."""
-    if port == 0:
+    if port == PORT_ANTENNA_FORWARD:
         return c * ct, c * st
-    if port == 1:
+    if port == PORT_ANTENNA_LEFT:
         return -c * st, c * ct
-    if port == 2:
+    if port == PORT_EAST:
         return c, 0.0
     return 0.0, c
 
@@ -394,13 +336,13 @@ def _expect_fix(
     st = math.sin(x[2])
     arm_forward, arm_left, shift_e, shift_n = 0.0, 0.0, 0.0, 0.0
     for k in range(kf):
-        pc = columns.fix[f, k] * x[10 + columns.fix_param[k]]
+        pc = columns.fix[f, k] * x[BASE_STATES + columns.fix_param[k]]
         port = columns.fix_port[k]
-        if port == 0:
+        if port == PORT_ANTENNA_FORWARD:
             arm_forward += pc
-        elif port == 1:
+        elif port == PORT_ANTENNA_LEFT:
             arm_left += pc
-        elif port == 2:
+        elif port == PORT_EAST:
             shift_e += pc
         else:
             shift_n += pc
@@ -414,7 +356,7 @@ def _expect_fix(
         v[q] = P[0, q] + he * P[2, q] + P[8, q]
         w[q] = P[1, q] + hn * P[2, q] + P[9, q]
     for k in range(kf):
-        j = 10 + columns.fix_param[k]
+        j = BASE_STATES + columns.fix_param[k]
         ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
         for q in range(n):
             v[q] += ce * P[j, q]
@@ -423,7 +365,7 @@ def _expect_fix(
     snn = events.fix_var_north_m2[f] + w[1] + hn * w[2] + w[9]
     sen = events.fix_cov_m2[f] + w[0] + he * w[2] + w[8]
     for k in range(kf):
-        j = 10 + columns.fix_param[k]
+        j = BASE_STATES + columns.fix_param[k]
         ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
         see += ce * v[j]
         snn += cn * w[j]
@@ -491,12 +433,12 @@ def forward(
         h = events.heading_row[i]
         if h >= 0:
             if model.heading_coloured_var > 0.0:
-                dth = t - memory[0]
+                dth = t - memory[MEM_HEADING_T]
                 if dth != last_dt_h:
                     factor_h = math.exp(-dth / model.heading_tau_s)
                     last_dt_h = dth
                 _decay(x, P, 7, factor_h, model.heading_coloured_var)
-            memory[0] = t
+            memory[MEM_HEADING_T] = t
             nu, s = _expect_heading(x, P, v, events, columns, model.use_offset, h)
             nis = nu * nu / s
             inlier = log_inlier - 0.5 * (nis + math.log(TWO_PI * s))
@@ -515,16 +457,19 @@ def forward(
                 else log_outlier_heading + math.log1p(math.exp(inlier - log_outlier_heading))
             )
             if not ok:
-                if memory[4] == 0.0:
-                    memory[5] = t
-                memory[4] += 1.0
-                if memory[4] >= model.recover_count and t - memory[5] >= model.recover_s:
+                if memory[MEM_HEADING_REJECTED] == 0.0:
+                    memory[MEM_HEADING_SINCE] = t
+                memory[MEM_HEADING_REJECTED] += 1.0
+                if (
+                    memory[MEM_HEADING_REJECTED] >= model.recover_count
+                    and t - memory[MEM_HEADING_SINCE] >= model.recover_s
+                ):
                     state = 6 if model.use_offset else 2
                     P[state, state] += nu * nu
-                    memory[4] = 0.0
-                    memory[6] += 1.0
+                    memory[MEM_HEADING_REJECTED] = 0.0
+                    memory[MEM_RECOVERIES] += 1.0
             else:
-                memory[4] = 0.0
+                memory[MEM_HEADING_REJECTED] = 0.0
                 inv_s = weight / s
                 gain = nu * inv_s
                 for q in range(n):
@@ -535,13 +480,13 @@ def forward(
         f = events.fix_row[i]
         if f >= 0:
             if model.fix_coloured_var > 0.0:
-                dtf = t - memory[1]
+                dtf = t - memory[MEM_FIX_T]
                 if dtf != last_dt_f:
                     factor_f = math.exp(-dtf / model.fix_tau_s)
                     last_dt_f = dtf
                 _decay(x, P, 8, factor_f, model.fix_coloured_var)
                 _decay(x, P, 9, factor_f, model.fix_coloured_var)
-            memory[1] = t
+            memory[MEM_FIX_T] = t
             nu_e, nu_n, see, snn, sen = _expect_fix(x, P, v, w, events, columns, f, out.antenna)
             ratio = sen / see
             s_n = snn - sen * ratio
@@ -567,20 +512,20 @@ def forward(
             )
             if fixes_teach:
                 if not ok:
-                    if memory[2] == 0.0:
-                        memory[3] = t
-                    memory[2] += 1.0
-                    memory[8] = 0.0
-                    if memory[2] >= model.recover_count and t - memory[3] >= model.recover_s:
-                        memory[7] += 1.0
-                        memory[6] += 1.0
-                        memory[2] = 0.0
-                        _open_position(x, P, nu_e, nu_n, memory[7], model.use_offset)
+                    if memory[MEM_FIX_REJECTED] == 0.0:
+                        memory[MEM_FIX_SINCE] = t
+                    memory[MEM_FIX_REJECTED] += 1.0
+                    memory[MEM_ACCEPTED_SINCE] = 0.0
+                    if memory[MEM_FIX_REJECTED] >= model.recover_count and t - memory[MEM_FIX_SINCE] >= model.recover_s:
+                        memory[MEM_FIX_LEVEL] += 1.0
+                        memory[MEM_RECOVERIES] += 1.0
+                        memory[MEM_FIX_REJECTED] = 0.0
+                        _open_position(x, P, nu_e, nu_n, memory[MEM_FIX_LEVEL], model.use_offset)
                 else:
-                    memory[2] = 0.0
-                    memory[8] += 1.0
-                    if memory[8] >= 10.0 * model.recover_count:
-                        memory[7] = 0.0
+                    memory[MEM_FIX_REJECTED] = 0.0
+                    memory[MEM_ACCEPTED_SINCE] += 1.0
+                    if memory[MEM_ACCEPTED_SINCE] >= 10.0 * model.recover_count:
+                        memory[MEM_FIX_LEVEL] = 0.0
                     inv_e = weight / see
                     for q in range(n):
                         w[q] -= ratio * v[q]

@@ -98,7 +98,7 @@ def test_a_lone_pivot_is_not_turned_back(slip_m, seed):
     """However much slips: without the mean turn of the whole run, the pivot would be undone bit by bit elsewhere."""
     t_s, right, left = pivot(slip_m, seed)
     _, clear_right, clear_left = denoised_angles(t_s, right, left, 1.0)
-    assert turn(clear_right, clear_left)[-1] == pytest.approx(turn(right, left)[-1], abs=0.1)
+    assert turn(clear_right, clear_left)[-1] == pytest.approx(np.pi / 2, abs=0.02 + 10 * slip_m)
 
 
 @pytest.mark.parametrize("drive", [straight, pivot, circle])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sccal.filter import kernel as K
+from sccal.filter import layout as K
 
 
 def make(

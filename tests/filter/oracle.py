@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sccal.filter import kernel as K
+from sccal.filter import layout as K
 
 BASE = K.BASE_STATES
 
@@ -86,15 +86,7 @@ def run(events, columns, model, x, P, kind=np.float64):
         t_before = t
         right, left = kind(events.right_rad[i]), kind(events.left_rad[i])
         F = jacobian(lambda z, r=right, le=left, i=i: motion(z, r, le, i, columns), x)
-        along = []
-        for radius, angle, port in ((x[3], right, K.PORT_RIGHT_WHEEL), (x[4], left, K.PORT_LEFT_WHEEL)):
-            extra = sum(
-                x[BASE + param] * columns.motion[i, k]
-                for k, param in enumerate(columns.motion_param)
-                if columns.motion_port[k] == port
-            )
-            along.append(radius * angle + extra)
-        variance = [model.slip2 * abs(a) + events.loose_m2[i] for a in along]
+        variance = [model.slip2 * abs(r * a) + events.loose_m2[i] for r, a in ((x[3], right), (x[4], left))]
         # Travel of a wheel enters as its angle does: through the derivative by the angle, over the radius.
         B = jacobian(lambda z, i=i, x=x: motion(x.astype(z.dtype), z[0], z[1], i, columns), np.array([right, left]))
         B = B / np.array([x[3], x[4]])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sccal.filter import kernel as K
+from sccal.filter import kernel
+from sccal.filter import layout as K
 from tests.filter import oracle
 from tests.filter.events import make, memory, output
 
@@ -15,7 +16,7 @@ ALL_FIX = (K.PORT_ANTENNA_FORWARD, K.PORT_ANTENNA_LEFT, K.PORT_EAST, K.PORT_NORT
 
 def run(events, columns, model, x, P, fixes_teach=True):
     x, P, out, kept = x.copy(), P.copy(), output(events), memory(events)
-    K.forward(events, columns, model, x, P, kept, 0, events.t_s.size, fixes_teach, out)
+    kernel.forward(events, columns, model, x, P, kept, 0, events.t_s.size, fixes_teach, out)
     return x, P, out, kept
 
 
@@ -64,7 +65,7 @@ def test_covariance_stays_symmetric_and_positive_over_ten_million_events():
     for _ in range(10):
         x[:3] = 0.1, -0.1, 0.02
         kept[:2] = events.t_s[0]
-        K.forward(events, columns, model, x, P, kept, 0, events.t_s.size, True, out)
+        kernel.forward(events, columns, model, x, P, kept, 0, events.t_s.size, True, out)
         assert np.array_equal(P, P.T)
         sigma = np.sqrt(np.diag(P))
         assert np.all(np.isfinite(x))
@@ -91,7 +92,7 @@ def test_a_pass_in_parts_equals_a_pass_in_one():
     whole_x, whole_P, whole_out, _ = run(events, columns, model, x0, P0)
     x, P, out, kept = x0.copy(), P0.copy(), output(events), memory(events)
     for first, last in ((0, 1), (1, 400), (400, 401), (401, 900)):
-        K.forward(events, columns, model, x, P, kept, first, last, True, out)
+        kernel.forward(events, columns, model, x, P, kept, first, last, True, out)
     assert np.array_equal(x, whole_x)
     assert np.array_equal(P, whole_P)
     assert np.array_equal(out.fix_nu, whole_out.fix_nu)
@@ -208,7 +209,7 @@ def test_a_few_outliers_are_rejected_and_do_not_open_the_filter():
 
 @pytest.mark.parametrize("angle", [-10.0, -np.pi, -0.1, 0.0, 3.0, np.pi, 50.0])
 def test_angles_wrap_into_half_open_turn(angle):
-    wrapped = K.wrap_angle(angle)
+    wrapped = kernel.wrap_angle(angle)
     assert -np.pi <= wrapped < np.pi
     assert np.cos(wrapped) == pytest.approx(np.cos(angle))
     assert np.sin(wrapped) == pytest.approx(np.sin(angle), abs=1e-9)

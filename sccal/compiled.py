@@ -1,7 +1,7 @@
 """Compilation of the kernel, with a cache that cannot go stale.
 
 numba's cache watches the file of the compiled function only: after an edit to another file that it calls, it would
-silently run the old code. The cache folder is therefore keyed by a hash of every source in this room.
+silently run the old code. The cache folder is therefore keyed by a hash of every source that compiles anything.
 """
 
 from __future__ import annotations
@@ -35,10 +35,12 @@ def _cache_home() -> Path:
 
 
 def source_key() -> str:
-    """Hash of this room's sources and of what compiles them."""
+    """Hash of the sources that use this module, and of what compiles them."""
     digest = hashlib.sha256(f"{sys.version_info[:2]} {numba.__version__}".encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        source = path.read_bytes()
+        if b"sccal.compiled" in source or path == Path(__file__):
+            digest.update(source)
     return digest.hexdigest()[:16]
 
 
