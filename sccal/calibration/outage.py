@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.align import Aligned
+from sccal.arrays import Bools, Floats, Ints
 from sccal.calibration.result import Outage, OutageWindow
 from sccal.filter.forward import Filter
 from sccal.filter.start import Start
@@ -32,7 +33,7 @@ def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: floa
     scratch = run.make_output(with_states=False)
     scratch = scratch._replace(state=run.output.state.copy(), sigma=run.output.sigma.copy())
     settled = max(start.until_s, start.moving_from_s + SETTLING_S)
-    windows: list[OutageWindow] = []
+    predicted: list[tuple[float, float, Ints, Floats]] = []
     begin = settled
     while begin + window_s <= aligned.span_s[1]:
         end = begin + window_s
@@ -41,24 +42,40 @@ def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: floa
         run.run_to(int(first))
         if rows.size >= MIN_FIXES and fix_t[rows[-1]] - begin >= MIN_COVERED * window_s:
             run.outage_to(int(last), scratch)
-            drift = np.hypot(
-                events.fix_east_m[rows] - scratch.antenna[rows, 0], events.fix_north_m[rows] - scratch.antenna[rows, 1]
-            )
-            distance = float(np.diff(np.interp([begin, end], aligned.wheel_t_s, travelled))[0])
-            windows.append(
-                OutageWindow(
-                    start_s=begin,
-                    end_s=end,
-                    distance_m=distance,
-                    rms_drift_m=float(np.sqrt(np.mean(drift**2))),
-                    end_drift_m=float(drift[-1]),
-                    t_s=fix_t[rows],
-                    drift_m=drift,
-                )
-            )
+            predicted.append((begin, end, rows, scratch.antenna[rows].copy()))
         begin = end
     run.run_to()
+    outlying = _isolated(~run.output.fix_ok, run.options.recover_count)
+    windows = []
+    for begin, end, rows, antenna in predicted:
+        kept = ~outlying[rows]
+        if kept.sum() < MIN_FIXES:
+            continue
+        seen = rows[kept]
+        drift = np.hypot(events.fix_east_m[seen] - antenna[kept, 0], events.fix_north_m[seen] - antenna[kept, 1])
+        distance = float(np.diff(np.interp([begin, end], aligned.wheel_t_s, travelled))[0])
+        windows.append(
+            OutageWindow(
+                start_s=begin,
+                end_s=end,
+                distance_m=distance,
+                rms_drift_m=float(np.sqrt(np.mean(drift**2))),
+                end_drift_m=float(drift[-1]),
+                t_s=fix_t[seen],
+                drift_m=drift,
+            )
+        )
     return summarise(windows, window_s, HOW.format(first=settled - start.moving_from_s))
+
+
+def _isolated(rejected: Bools, too_many: int) -> Bools:
+    """Rejected fixes in streaks too short to mean that the filter, not the fix, was wrong: outliers judge nothing."""
+    padded = np.concatenate(([False], rejected, [False]))
+    change = np.flatnonzero(np.diff(padded.astype(np.int8)))
+    isolated = np.zeros(rejected.size, dtype=np.bool_)
+    for first, last in zip(change[::2], change[1::2], strict=True):
+        isolated[first:last] = last - first < too_many
+    return isolated
 
 
 def summarise(windows: list[OutageWindow], window_s: float, how: str) -> Outage:

@@ -55,6 +55,8 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
 
     values, final = iterate(problem, Constants.of(honest.final_state))
     covariance = final.final_covariance[3:7, 3:7]
+    if options.filter.with_offset:
+        covariance[3, 3] += _variance_of_the_level(problem)
     drive = describe_drive(aligned, float(values[:2].mean()))
     return (
         Calibration(
@@ -80,15 +82,16 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
 
 
 def measure_fit(problem: RunProblem, found: ForwardPass) -> Fit:
-    """Innovation figures of one pass, from SETTLED_S after the first motion on."""
+    """Innovation figures of one pass, from SETTLED_S after the first motion on; fixes of the leading quality."""
     timeline, aligned = problem.timeline, problem.aligned
     settled = problem.start.moving_from_s + SETTLED_S
     heading = found.heading_accepted & (aligned.heading_t_s[timeline.heading_index] >= settled)
-    fix = found.fix_accepted & (aligned.fix_t_s[timeline.fix_index] >= settled)
+    leading = aligned.fix_leading[timeline.fix_index]
+    fix = found.fix_accepted & leading & (aligned.fix_t_s[timeline.fix_index] >= settled)
     if not heading.any():
         heading = found.heading_accepted
     if not fix.any():
-        fix = found.fix_accepted
+        fix = found.fix_accepted & leading
     return fit_of(
         found.heading_nu_rad[heading],
         found.heading_var_rad2[heading],
@@ -137,6 +140,18 @@ def describe_drive(aligned: Aligned, radius_m: float) -> Drive:
         turned_left_rad=float(turn[turning & (turn > 0)].sum()),
         turned_right_rad=abs(float(turn[turning & (turn < 0)].sum())),
     )
+
+
+def _variance_of_the_level(problem: RunProblem) -> float:
+    """What the heading offset's variance (rad²) lacks because the level of the AHRS's slow error is itself estimated.
+
+    A run of n correlation times (2τ each) knows that level's variance to about 2/n of itself; the offset's share of it
+    is the n-th part, and is widened by as much, as Student's distribution would.
+    """
+    noise = problem.noise
+    first, last = problem.aligned.span_s
+    count = max((last - first) / (2.0 * noise.heading_tau_s), 1.0)
+    return noise.heading_coloured_rad**2 / count * (2.0 / count)
 
 
 def _doubts(problem: RunProblem, found: ForwardPass) -> list[Notice]:

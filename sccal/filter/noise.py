@@ -51,9 +51,9 @@ def _scales(fix_sigma_m: float) -> tuple[_Scale, ...]:
     """In the order of Noise's first seven fields; fix_sigma_m is the leading quality's typical sigma."""
     return (
         _Scale(np.radians(0.2), 1.5, np.radians(0.005), np.radians(30.0)),
-        _Scale(np.radians(0.5), 1.0, np.radians(0.005), np.radians(60.0)),
-        _Scale(15.0, 0.5, 1.0, 300.0),
-        _Scale(1.0, 2.0, 0.02, 1000.0),
+        _Scale(np.radians(0.7), 1.2, np.radians(0.005), np.radians(60.0)),
+        _Scale(25.0, 0.8, 1.0, 300.0),
+        _Scale(1.0, 2.0, 0.001, 1000.0),
         _Scale(fix_sigma_m, 1.5, 1e-4, 100.0),
         _Scale(40.0, 0.5, 2.0, 600.0),
         _Scale(0.005, 1.5, 2e-4, 1.0),

@@ -22,12 +22,15 @@ from sccal.logs.streams import Vehicle
 FIRST_WINDOW_S = 10.0
 GROWTH = 1.6
 ENOUGH_RAD = np.radians(1.0)
+PATIENCE_S = 30.0
+"""After this long, a less sure start is better than one that uses up the run."""
 MIN_SPREAD_M = 1.0
 HARDLY_M = 0.3
 UNSURE_RAD = 0.7
 CORRELATION_S = 3.0
 HEADING_FLOOR_RAD = np.radians(3.0)
 HUBER = 1.5
+PHASE_CENTRE_M = 0.01
 ODD_SCALE = 0.15
 """Beyond this the wheels' declared scale, not their wear, is wrong."""
 
@@ -90,7 +93,7 @@ def find_start(aligned: Aligned) -> Start:
         rows = np.flatnonzero((aligned.fix_t_s <= until) & (aligned.fix_t_s >= moving_from - FIRST_WINDOW_S))
         if rows.size >= 5:
             fit = _similarity(path_at_fixes[rows], fixes[rows], sigma[rows], aligned.fix_t_s[rows])
-            if fit.sigma_angle < ENOUGH_RAD and fit.spread_m > MIN_SPREAD_M:
+            if fit.sigma_angle < ENOUGH_RAD * max(1.0, length / PATIENCE_S) and fit.spread_m > MIN_SPREAD_M:
                 break
         if until >= last:
             break
@@ -184,6 +187,7 @@ def _similarity(path: Complexes, fixes: Complexes, sigma_m: Floats, t_s: Floats)
     rms = float(np.sqrt((weight * residual**2).sum() / total))
     spread = float(np.sqrt((weight * np.abs(p) ** 2).sum() / total))
     independent = max(2.0, min(path.size / 2.0, float(np.ptp(t_s)) / CORRELATION_S))
-    noise = max(rms, float(np.sqrt(1.0 / base.mean())))
+    # The scatter tells; what the receiver states, or a table for it, counts only where the scatter cannot: few fixes.
+    noise = max(rms, float(np.sqrt(1.0 / base.mean())) / path.size, PHASE_CENTRE_M)
     moved = abs(alpha) * spread
     return _Similarity(alpha, path_mean, fix_mean, rms, moved, noise / (max(moved, 1e-6) * math.sqrt(independent)))
