@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from sccal.align.accuracy import (
     table_sigma_m,
     usable,
 )
+from sccal.align.agreement import check_agreement
 from sccal.align.clocks import Clock, fixes_on_host_clock, require_overlap
 from sccal.align.signs import check_signs
 from sccal.arrays import Bools, Floats, Ints
@@ -144,7 +145,7 @@ def align(run: Run) -> Aligned:
         notices=tuple(notices),
     )
     check_signs(aligned)
-    return aligned
+    return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
 
 
 def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStream:

@@ -69,7 +69,7 @@ def check_signs(aligned: Aligned) -> None:
     _check_turning(aligned)
 
 
-def _wheel_turn(aligned: Aligned, t_s: Floats) -> Floats:
+def wheel_turn(aligned: Aligned, t_s: Floats) -> Floats:
     """Turning by the wheels (rad, nominal radius and track) up to each time."""
     difference = aligned.right_rad - aligned.left_rad
     scale = aligned.vehicle.wheel_radius_m / aligned.vehicle.track_m
@@ -139,9 +139,9 @@ def _check_turning(aligned: Aligned) -> None:
         return
     inside = (t_s >= aligned.heading_t_s[0]) & (t_s <= aligned.heading_t_s[-1])
     t_s = t_s[inside]
-    wheels = np.diff(_wheel_turn(aligned, t_s))
+    wheels = np.diff(wheel_turn(aligned, t_s))
     yaw = np.diff(np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad))
-    swing, turned = float(np.ptp(aligned.yaw_rad)), float(np.ptp(_wheel_turn(aligned, t_s)))
+    swing, turned = float(np.ptp(aligned.yaw_rad)), float(np.ptp(wheel_turn(aligned, t_s)))
     if swing < STUCK_YAW_RAD and turned > STUCK_TURN_RAD:
         raise DataError(
             f"ahrs.csv: the yaw stays within {np.degrees(swing):.2f}° while the wheels turn the robot by "
@@ -155,7 +155,7 @@ def _check_turning(aligned: Aligned) -> None:
 
     convention = aligned.vehicle.convention
     other = "ned" if convention == "enu" else "enu"
-    wheels_fit = _turns_as_the_fixes_do(aligned, _wheel_turn(aligned, aligned.wheel_t_s))
+    wheels_fit = _turns_as_the_fixes_do(aligned, wheel_turn(aligned, aligned.wheel_t_s))
     yaw_fits = _turns_as_the_fixes_do(aligned, np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad))
     seen = (
         f"the AHRS yaw turns against the wheels (slope {yaw_on_wheels.value:+.2f}, "

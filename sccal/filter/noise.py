@@ -33,6 +33,8 @@ MAX_CLIMBS = 3
 WORTH_ANOTHER_CLIMB = 5.0
 SETTLED_HILLS = 4
 DIFFERENCE = 0.02
+REACH = 2.5
+"""Of one climb, in logarithms: a factor of twelve."""
 NORMAL_MAD = 1.4826
 DEFAULT_COLOURED_TAU_S = 30.0
 
@@ -114,7 +116,7 @@ class _Likelihood:
         white = _white_level_m(self.aligned, self.start, self.aligned.fix_leading)
         white = max(white if np.isfinite(white) else self.fix_sigma_m, 1e-4)
         points = []
-        for coloured, slip, heading_rad in product((1.0, 5.0, 25.0), (0.002, 0.01), np.radians((0.5, 5.0))):
+        for coloured, slip, heading_rad in product((0.1, 1.0, 5.0, 25.0), (0.002, 0.01), np.radians((0.5, 5.0))):
             point = self.centre.copy()
             point[1] = np.log(heading_rad)
             point[3] = np.log(white / self.fix_sigma_m)
@@ -149,9 +151,14 @@ class _Likelihood:
     def climb(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
         """The most likely levels from a far starting point, the constants' linearisation fixed (Powell)."""
         cost = self._cost_of_free(timeline, logs, constants)
+        start = logs[self.free]
+        # Its line searches look at the whole range between the bounds, which far away holds other hills.
+        limits = [
+            (max(low, at - REACH), min(high, at + REACH)) for (low, high), at in zip(self._limits(), start, strict=True)
+        ]
         options = {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4}
-        found = minimize(cost, logs[self.free], method="Powell", bounds=self._limits(), options=options)
-        return self._with_free(logs, found.x)
+        found = minimize(cost, start, method="Powell", bounds=limits, options=options)
+        return self._with_free(logs, found.x) if found.fun < cost(start) else logs
 
     def climb_smoothly(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
         """The same from a near one (L-BFGS-B). The kernel releases the GIL, so the differences share the cores."""

@@ -28,6 +28,8 @@ class Notice:
     where: str = ""
     """Place of the first one: ``line 40`` or ``t = 12.3 s``."""
     severity: Literal["info", "warning"] = "info"
+    doubt: str = ""
+    """Why results may be wrong because of it, for the verdict; empty where it was dealt with for good."""
 
     def __str__(self) -> str:
         place = f" (first at {self.where})" if self.where else ""

@@ -12,12 +12,16 @@ from itertools import pairwise
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.errors import DataError
 from sccal.logs.streams import Notice
 
 SWAP_LIMIT_S = 0.5
 """Rows this much behind the latest are taken as swapped by buffering, not as a clock step."""
 LEAP_LIMIT_S = 86400.0
 """No run holds a pause this long: the clock was set, or the stamp is garbage."""
+LEAST_SHARE = 0.5
+"""With fewer rows left in order, nobody knows which of them tell the truth."""
+FEW_ROWS = 20
 _LOOK_BACK_SEGMENTS = 400
 
 
@@ -31,7 +35,11 @@ def order_in_time(t_s: Floats, line: Ints, source: str) -> tuple[Ints, tuple[Not
     if (steps_s <= 0).any():
         order = _without_steps_back(t_s, line, source, notices)
         order = _sorted_swaps(t_s, order, line, source, notices)
-    return _without_leaps(t_s, order, line, source, notices), tuple(notices)
+    order = _without_leaps(t_s, order, line, source, notices)
+    if order.size < LEAST_SHARE * t_s.size and t_s.size > FEW_ROWS:
+        why = "; ".join(str(notice) for notice in notices)
+        raise DataError(f"{source}: {t_s.size - order.size} of {t_s.size} rows are out of order in time: {why}")
+    return order, tuple(notices)
 
 
 def _without_steps_back(t_s: Floats, line: Ints, source: str, notices: list[Notice]) -> Ints:
@@ -94,9 +102,11 @@ def _tell_dropped(t_s: Floats, keep: Bools, line: Ints, source: str, notices: li
                 if np.isfinite(bound_s)
                 else f" (t = {t_s[row]:.3f} s)"
             )
+            doubt = ""
             if what.endswith("back"):
                 detail = f" by {before[row] - t_s[row]:.3f} s"
-            notices.append(Notice(source, what + detail, int(rows.size), f"line {line[row]}", "warning"))
+                doubt = f"the clock of {source} stepped back{detail}"
+            notices.append(Notice(source, what + detail, int(rows.size), f"line {line[row]}", "warning", doubt))
     if equal.any():
         rows = dropped[equal]
         notices.append(Notice(source, "rows with a time seen before dropped", int(rows.size), f"line {line[rows[0]]}"))

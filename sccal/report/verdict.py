@@ -39,7 +39,7 @@ class Verdict:
 
 def run_verdict(calibration: Calibration) -> Verdict:
     """Of one run."""
-    doubts = _noise_doubts(calibration.noise)
+    doubts = [*(notice.doubt for notice in calibration.notices if notice.doubt), *_noise_doubts(calibration.noise)]
     return _verdict(calibration.parameters, calibration.fit, calibration.with_offset, doubts)
 
 

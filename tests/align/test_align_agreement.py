@@ -1,0 +1,68 @@
+"""Streams that do not move together are told, or refused; streams that do are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sccal.align import align
+from sccal.errors import DataError
+from sccal.report.verdict import run_verdict
+from tests.runs import read, written
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return read(written(tmp_path_factory.mktemp("run"), duration_s=300, seed=5))
+
+
+def doubts(run):
+    return [notice.doubt for notice in align(run).notices if notice.doubt]
+
+
+def late(stream, seconds, after):
+    return replace(stream, t_s=np.where(stream.t_s > after, stream.t_s + seconds, stream.t_s))
+
+
+def test_streams_that_move_together_raise_no_doubt(run):
+    assert doubts(run) == []
+
+
+def test_a_heading_that_falls_behind_is_told_with_its_place(run):
+    middle = float(np.median(run.heading.t_s))
+    shifted = replace(run, heading=late(run.heading, 5.0, middle))
+    (doubt,) = doubts(shifted)
+    assert doubt.startswith("yaw and wheels do not turn together in")
+    place = next(n.where for n in align(shifted).notices if n.doubt)
+    assert float(place.removeprefix("t = ").removesuffix(" s")) > middle - 60.0
+
+
+def test_a_heading_that_is_behind_all_the_time_is_refused(run):
+    shifted = replace(run, heading=replace(run.heading, t_s=run.heading.t_s + 20.0))
+    with pytest.raises(DataError, match=r"do not turn together \(correlation [-+]0\.\d\d over \d+ s of turning\)"):
+        align(shifted)
+
+
+def test_fixes_that_fall_behind_are_told(run):
+    middle = float(np.median(run.fixes.host_t_s))
+    host = np.where(run.fixes.host_t_s > middle, run.fixes.host_t_s + 8.0, run.fixes.host_t_s)
+    utc = np.where(run.fixes.host_t_s > middle, run.fixes.utc_s + 8.0, run.fixes.utc_s)
+    assert any(
+        "fixes and wheels" in d for d in doubts(replace(run, fixes=replace(run.fixes, host_t_s=host, utc_s=utc)))
+    )
+
+
+def test_a_doubt_reaches_the_verdict(run):
+    from sccal.calibration.options import CalibrationOptions
+    from sccal.calibration.single import calibrate_run
+    from tests.calibration.test_single import GIVEN
+
+    calibration, _ = calibrate_run(run, CalibrationOptions(noise=GIVEN))
+    assert run_verdict(calibration).level == "good"
+    odd = replace(calibration.notices[0], doubt="the clock stepped back") if calibration.notices else None
+    assert odd is not None
+    verdict = run_verdict(replace(calibration, notices=(odd,)))
+    assert verdict.level == "doubtful"
+    assert "the clock stepped back" in str(verdict)
