@@ -23,8 +23,8 @@ GRID_S = 0.1
 PENALTY = 25.0
 """Cost of one more segment in units of χ²: a change must show at 5 σ."""
 CLEAR_SIGMAS = 4.0
-LONGEST = 600
-"""Steps of one segment at most: bounds the work; a minute is long enough to average slip away."""
+LONGEST = 300
+"""Steps of one segment at first: bounds the work. Neighbours that are one motion are joined afterwards."""
 FEWEST_STEPS = 8
 NORMAL_MAD = 1.4826
 
@@ -61,7 +61,7 @@ def _denoise(steps: Floats, travelled: Floats) -> Floats:
         return steps
     rough = np.diff(x / d) / np.sqrt(1.0 / d[1:] + 1.0 / d[:-1])
     level2 = max(NORMAL_MAD * float(np.median(np.abs(rough))), 1e-12) ** 2
-    bounds = np.append(_segments(x, d, level2, PENALTY, LONGEST), x.size)
+    bounds = np.append(_joined(_segments(x, d, level2, PENALTY, LONGEST), x, d, level2, PENALTY), x.size)
     total, length = np.add.reduceat(x, bounds[:-1]), np.add.reduceat(d, bounds[:-1])
     share = np.where(total**2 > CLEAR_SIGMAS**2 * level2 * length, total / length, 0.0)
     clear = np.zeros(steps.size)
@@ -103,3 +103,29 @@ def _segments(x: Floats, d: Floats, level2: float, penalty: float, longest: int)
         count -= 1
         first[count] = at
     return first
+
+
+@compiled
+def _joined(first: Ints, x: Floats, d: Floats, level2: float, penalty: float) -> Ints:
+    """The segments with each joined to the one before it where that costs less than a segment.
+
+    Only a cut at the length limit can be joined: any other was found worth its price.
+    """
+    count = first.shape[0]
+    starts = first.copy()
+    kept = 1
+    sum_x, sum_d = 0.0, 0.0
+    for k in range(count):
+        end = first[k + 1] if k + 1 < count else x.shape[0]
+        own_x, own_d = x[first[k] : end].sum(), d[first[k] : end].sum()
+        if k > 0:
+            apart = sum_x / sum_d - own_x / own_d
+            cost = apart * apart / (1.0 / sum_d + 1.0 / own_d) / level2
+            if cost < penalty:
+                sum_x += own_x
+                sum_d += own_d
+                continue
+            starts[kept] = first[k]
+            kept += 1
+        sum_x, sum_d = own_x, own_d
+    return starts[:kept]
