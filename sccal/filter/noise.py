@@ -32,6 +32,8 @@ FIX_RATE_HZ = 5.0
 MAX_CLIMBS = 3
 WORTH_ANOTHER_CLIMB = 5.0
 SETTLED_HILLS = 4
+FAST = (0, 3, 6)
+"""White heading, white fixes and slip, among Noise's fields: what a thinned log shows least well."""
 DIFFERENCE = 0.02
 REACH = 2.5
 """Of one climb, in logarithms: a factor of twelve."""
@@ -66,7 +68,7 @@ def estimate_noise(aligned: Aligned, start: Start, options: FilterOptions, headi
     """The log's own noise: first rough constants under assumed noise, then the noise given them.
 
     A coarse search over thinned measurements finds the right hill (a correlated fix error and a slipping wheel can
-    both carry the blame), and a fine one over all of them its top.
+    both carry the blame); a fine one over all of them then settles what their number changes: white levels and slip.
     """
     soft = replace(options, soft_gate=True)
     likelihood = _Likelihood(aligned, start, soft)
@@ -161,20 +163,26 @@ class _Likelihood:
         return self._with_free(logs, found.x) if found.fun < cost(start) else logs
 
     def climb_smoothly(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
-        """The same from a near one (L-BFGS-B). The kernel releases the GIL, so the differences share the cores."""
-        cost = self._cost_of_free(timeline, logs, constants)
+        """The fast levels from a near point (L-BFGS-B). The kernel frees the GIL, so differences share the cores."""
+        fast = np.isin(np.arange(logs.size), FAST)
+
+        def with_fast(part: Floats) -> Floats:
+            at = logs.copy()
+            at[fast] = part
+            return at
+
+        whole = self._cost_of_free(timeline, logs, constants)
         with ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, 4)) as pool:
 
             def cost_and_slope(part: Floats) -> tuple[float, Floats]:
                 points = [part, *(part + DIFFERENCE * unit for unit in np.eye(part.size))]
-                here, *beside = pool.map(cost, points)
+                here, *beside = pool.map(lambda point: whole(with_fast(point)[self.free]), points)
                 return here, (np.array(beside) - here) / DIFFERENCE
 
             options = {"maxiter": 5, "maxls": 5, "ftol": 1e-6}
-            found = minimize(
-                cost_and_slope, logs[self.free], jac=True, method="L-BFGS-B", bounds=self._limits(), options=options
-            )
-        return self._with_free(logs, found.x)
+            limits = list(zip(self.low[fast], self.high[fast], strict=True))
+            found = minimize(cost_and_slope, logs[fast], jac=True, method="L-BFGS-B", bounds=limits, options=options)
+        return with_fast(found.x)
 
     def _cost_of_free(self, timeline: Timeline, logs: Floats, constants: Constants) -> Callable[[Floats], float]:
         clear = self.problem(timeline, logs).clear_steps(constants)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -218,7 +219,13 @@ def test_a_pause_of_hours_is_no_fault(tmp_path: Path) -> None:
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(-1e10, 1e10) | st.integers(0, 50).map(float), min_size=1, max_size=40))
 def test_any_times_become_strictly_increasing(tmp_path_factory: pytest.TempPathFactory, times: list[float]) -> None:
-    got = stamps(tmp_path_factory.mktemp("run"), times)
+    try:
+        got = stamps(tmp_path_factory.mktemp("run"), times)
+    except DataError as error:
+        refused = re.search(rf"\d+ of {len(times)} rows are out of order in time", str(error))
+        if refused and len(times) > 20:
+            return
+        raise
     assert (np.diff(got.columns["t"]) > 0).all()
     assert got.columns["t"].size + sum(n.count for n in got.notices if "sorted" not in n.what) == len(times)
     written = np.array([float(f"{t:.3f}") for t in times])
