@@ -17,11 +17,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
     {"errors", "arrays", "compiled"},
     {"geodesy", "logs"},
-    {"align"},
+    {"align", "simulate"},
     {"effects"},
     {"filter"},
     {"calibration"},
-    {"simulate"},
     {"report"},
     {"batch"},
     {"cli"},

@@ -41,6 +41,9 @@ class Aligned:
     yaw_rad: Floats
     """AHRS reading turned into enu (h,), unwrapped."""
     yaw_sigma_rad: Floats | None
+    pitch_rad: Floats | None
+    """Nose up, at the heading's times; None where the AHRS does not give it."""
+    roll_rad: Floats | None
     fix_t_s: Floats
     fix_east_m: Floats
     fix_north_m: Floats
@@ -134,6 +137,8 @@ def align(run: Run) -> Aligned:
         heading_t_s=heading.t_s[seen],
         yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], run.vehicle.convention)),
         yaw_sigma_rad=None if heading.yaw_sigma_rad is None else heading.yaw_sigma_rad[seen],
+        pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
+        roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
         fix_t_s=t_s[good_index],
         fix_east_m=east,
         fix_north_m=north,

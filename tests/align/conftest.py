@@ -113,6 +113,8 @@ def aligned_by_hand() -> Callable[..., Aligned]:
             heading_t_s=heading_t_s,
             yaw_rad=np.zeros(heading_t_s.size),
             yaw_sigma_rad=None,
+            pitch_rad=None,
+            roll_rad=None,
             fix_t_s=fix_t_s,
             fix_east_m=np.zeros(fixes),
             fix_north_m=np.zeros(fixes),

@@ -1,0 +1,141 @@
+"""What columns may be computed from: the drive as wheels, heading and tilt show it, at every event and measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sccal.align import Aligned, Timeline
+from sccal.arrays import Floats
+
+SMOOTH_S = 0.3
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The n motion events of a timeline; each quantity belongs to the step that ends there (0 at the first)."""
+
+    t_s: Floats
+    dt_s: Floats
+    right_m: Floats
+    """Travel of the right wheel."""
+    left_m: Floats
+    along_m: Floats
+    turn_rad: Floats
+    """By the wheels."""
+    speed_mps: Floats
+    turn_rate_radps: Floats
+    acceleration_mps2: Floats
+    """Along; positive while a forward speed grows."""
+    right_angle_rad: Floats
+    """Cumulative angle of the right wheel from the log's first sample, in the middle of the step."""
+    left_angle_rad: Floats
+    pitch_rad: Floats
+    """Nose up; 0 where the AHRS does not give it."""
+    roll_rad: Floats
+    """Left side up."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """The robot at some measurements."""
+
+    t_s: Floats
+    speed_mps: Floats
+    turn_rate_radps: Floats
+    acceleration_mps2: Floats
+    yaw_rad: Floats
+    """The robot's heading as far as known, not wrapped."""
+    east_m: Floats
+    north_m: Floats
+
+
+@dataclass(frozen=True)
+class DriveView:
+    """One run, seen for its effects."""
+
+    start_s: float
+    """First time of the run: drifts and steps count from here."""
+    duration_s: float
+    steps: Steps
+    headings: Moments
+    fixes: Moments
+    step_columns: Mapping[str, Floats] = field(default_factory=dict)
+    """The log's further columns, interpolated to the motion events."""
+    heading_columns: Mapping[str, Floats] = field(default_factory=dict)
+    """The same at the heading readings."""
+    has_tilt: bool = False
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known of the vehicle and its path when columns are computed."""
+
+    radius_right_m: float
+    radius_left_m: float
+    track_m: float
+    t_s: Floats
+    """Times of the path (k,)."""
+    yaw_rad: Floats
+    east_m: Floats
+    north_m: Floats
+
+
+def view_drive(aligned: Aligned, timeline: Timeline, belief: Belief) -> DriveView:
+    """The drive at the timeline's events and measurements."""
+    t = aligned.wheel_t_s
+    right = belief.radius_right_m * aligned.right_rad
+    left = belief.radius_left_m * aligned.left_rad
+    along, turn = 0.5 * (right + left), (right - left) / belief.track_m
+    half = 0.5 * SMOOTH_S
+
+    def rate(cumulative: Floats, at_s: Floats) -> Floats:
+        first, last = np.maximum(at_s - half, t[0]), np.minimum(at_s + half, t[-1])
+        change = np.interp(last, t, cumulative) - np.interp(first, t, cumulative)
+        return np.asarray(change / np.maximum(last - first, 1e-9))
+
+    def acceleration(at_s: Floats) -> Floats:
+        return (rate(along, at_s + half) - rate(along, at_s - half)) / (2.0 * half)
+
+    def moments(at_s: Floats) -> Moments:
+        return Moments(
+            t_s=at_s,
+            speed_mps=rate(along, at_s),
+            turn_rate_radps=rate(turn, at_s),
+            acceleration_mps2=acceleration(at_s),
+            yaw_rad=np.interp(at_s, belief.t_s, belief.yaw_rad),
+            east_m=np.interp(at_s, belief.t_s, belief.east_m),
+            north_m=np.interp(at_s, belief.t_s, belief.north_m),
+        )
+
+    ends = timeline.t_s
+    dt = np.diff(ends, prepend=ends[0])
+    middle = ends - 0.5 * dt
+    right_m, left_m = belief.radius_right_m * timeline.right_rad, belief.radius_left_m * timeline.left_rad
+    pitch, roll = aligned.pitch_rad, aligned.roll_rad
+    zeros = np.zeros(ends.size)
+    steps = Steps(
+        t_s=ends,
+        dt_s=dt,
+        right_m=right_m,
+        left_m=left_m,
+        along_m=0.5 * (right_m + left_m),
+        turn_rad=(right_m - left_m) / belief.track_m,
+        speed_mps=rate(along, middle),
+        turn_rate_radps=rate(turn, middle),
+        acceleration_mps2=acceleration(middle),
+        right_angle_rad=np.interp(middle, t, aligned.right_rad),
+        left_angle_rad=np.interp(middle, t, aligned.left_rad),
+        pitch_rad=zeros if pitch is None else np.interp(middle, aligned.heading_t_s, pitch),
+        roll_rad=zeros if roll is None else np.interp(middle, aligned.heading_t_s, roll),
+    )
+    return DriveView(
+        start_s=aligned.span_s[0],
+        duration_s=aligned.span_s[1] - aligned.span_s[0],
+        steps=steps,
+        headings=moments(aligned.heading_t_s[timeline.heading_index]),
+        fixes=moments(aligned.fix_t_s[timeline.fix_index]),
+        has_tilt=pitch is not None and roll is not None,
+    )
