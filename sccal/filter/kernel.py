@@ -77,7 +77,30 @@ def wrap_angle(angle: float) -> float:
 
 
 @compiled
-def _move(
+def step_of(x: Floats, right: float, left: float, row: int, columns: Columns) -> tuple[float, float, float, float]:
+    """s, d and Δθ of one step, and how much further the effects move the right wheel than the left one."""
+    along, side, turn, more_right, more_left = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(columns.motion_port.shape[0]):
+        pc = x[BASE_STATES + columns.motion_param[k]] * columns.motion[row, k]
+        port = columns.motion_port[k]
+        if port == PORT_ALONG:
+            along += pc
+        elif port == PORT_SIDE:
+            side += pc
+        elif port == PORT_TURN:
+            turn += pc
+        elif port == PORT_RIGHT_WHEEL:
+            more_right += pc
+        else:
+            more_left += pc
+    along_right = x[3] * right + more_right
+    along_left = x[4] * left + more_left
+    s = 0.5 * (along_right + along_left) + along
+    return s, side, (along_right - along_left) / x[5] + turn, more_right - more_left
+
+
+@compiled
+def move(
     x: Floats,
     P: Floats,
     work: Floats,
@@ -95,29 +118,13 @@ def _move(
     n = x.shape[0]
     gs, gt, gd, S, T, D = work[0], work[1], work[2], work[3], work[4], work[5]
     km = columns.motion_port.shape[0]
-
-    along_right = x[3] * right
-    along_left = x[4] * left
-    along, side, turn = 0.0, 0.0, 0.0
+    s, side, dtheta, effects = step_of(x, right, left, row, columns)
     inv_track = 1.0 / x[5]
     for k in range(km):
-        c = columns.motion[row, k]
         j = BASE_STATES + columns.motion_param[k]
         gs[j] = 0.0
         gt[j] = 0.0
         gd[j] = 0.0
-        pc = x[j] * c
-        port = columns.motion_port[k]
-        if port == PORT_ALONG:
-            along += pc
-        elif port == PORT_SIDE:
-            side += pc
-        elif port == PORT_TURN:
-            turn += pc
-        elif port == PORT_RIGHT_WHEEL:
-            along_right += pc
-        else:
-            along_left += pc
     for k in range(km):
         c = columns.motion[row, k]
         j = BASE_STATES + columns.motion_param[k]
@@ -135,8 +142,6 @@ def _move(
             gs[j] += 0.5 * c
             gt[j] -= c * inv_track
 
-    s = 0.5 * (along_right + along_left) + along
-    dtheta = (along_right - along_left) * inv_track + turn
     middle = x[2] + 0.5 * dtheta
     cm = math.cos(middle)
     sm = math.sin(middle)
@@ -152,7 +157,6 @@ def _move(
     gs4 = 0.5 * left_clear
     gt3 = right_clear * inv_at_track
     gt4 = -left_clear * inv_at_track
-    effects = (along_right - x[3] * right) - (along_left - x[4] * left)
     gt5 = -(at_right * right_clear - at_left * left_clear + effects) * inv_at_track * inv_at_track
 
     for q in range(n):
@@ -228,7 +232,7 @@ def _move(
 
 
 @compiled
-def _decay(x: Floats, P: Floats, state: int, factor: float, stationary_var: float) -> None:
+def decay(x: Floats, P: Floats, state: int, factor: float, stationary_var: float) -> None:
     """First-order Gauss-Markov step of one state: x ← f x, variance towards the stationary one."""
     n = x.shape[0]
     x[state] *= factor
@@ -240,7 +244,7 @@ def _decay(x: Floats, P: Floats, state: int, factor: float, stationary_var: floa
 
 
 @compiled
-def _downdate(P: Floats, v: Floats, inv_s: float) -> None:
+def downdate(P: Floats, v: Floats, inv_s: float) -> None:
     """P ← P − v vᵀ/S, symmetric to the last bit."""
     n = v.shape[0]
     for i in range(n):
@@ -250,7 +254,7 @@ def _downdate(P: Floats, v: Floats, inv_s: float) -> None:
 
 
 @compiled
-def _clamp(x: Floats, lower: Floats, upper: Floats) -> None:
+def clamp(x: Floats, lower: Floats, upper: Floats) -> None:
     for k in range(3):
         if x[3 + k] < lower[k]:
             x[3 + k] = lower[k]
@@ -286,7 +290,7 @@ def _open_position(x: Floats, P: Floats, nu_e: float, nu_n: float, level: float,
 
 
 @compiled
-def _expect_heading(
+def expect_heading(
     x: Floats, P: Floats, v: Floats, events: Events, columns: Columns, use_offset: bool, h: int
 ) -> tuple[float, float]:
     """Innovation ν and its variance S of one heading reading; v (n,) becomes P Hᵀ."""
@@ -314,7 +318,7 @@ def _expect_heading(
 
 
 @compiled
-def _fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
+def fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
     """East and north derivative of a fix by a parameter whose column value is c."""
     if port == PORT_ANTENNA_FORWARD:
         return c * ct, c * st
@@ -326,7 +330,7 @@ def _fix_row(port: int, c: float, ct: float, st: float) -> tuple[float, float]:
 
 
 @compiled
-def _expect_fix(
+def expect_fix(
     x: Floats, P: Floats, v: Floats, w: Floats, events: Events, columns: Columns, f: int, antenna: Floats
 ) -> tuple[float, float, float, float, float]:
     """Innovations east and north, S_ee, S_nn, S_en of one fix; v and w (n,) become P H_eᵀ and P H_nᵀ."""
@@ -357,7 +361,7 @@ def _expect_fix(
         w[q] = P[1, q] + hn * P[2, q] + P[9, q]
     for k in range(kf):
         j = BASE_STATES + columns.fix_param[k]
-        ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
+        ce, cn = fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
         for q in range(n):
             v[q] += ce * P[j, q]
             w[q] += cn * P[j, q]
@@ -366,7 +370,7 @@ def _expect_fix(
     sen = events.fix_cov_m2[f] + w[0] + he * w[2] + w[8]
     for k in range(kf):
         j = BASE_STATES + columns.fix_param[k]
-        ce, cn = _fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
+        ce, cn = fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
         see += ce * v[j]
         snn += cn * w[j]
         sen += ce * w[j]
@@ -415,7 +419,7 @@ def forward(
         left_clear = events.left_clear_rad[i]
         standing = right == 0.0 and left == 0.0 and right_clear == 0.0 and left_clear == 0.0
         if not standing or events.loose_m2[i] > 0.0 or columns.motion_port.shape[0] > 0:
-            _move(
+            move(
                 x,
                 P,
                 work,
@@ -437,9 +441,9 @@ def forward(
                 if dth != last_dt_h:
                     factor_h = math.exp(-dth / model.heading_tau_s)
                     last_dt_h = dth
-                _decay(x, P, 7, factor_h, model.heading_coloured_var)
+                decay(x, P, 7, factor_h, model.heading_coloured_var)
             memory[MEM_HEADING_T] = t
-            nu, s = _expect_heading(x, P, v, events, columns, model.use_offset, h)
+            nu, s = expect_heading(x, P, v, events, columns, model.use_offset, h)
             nis = nu * nu / s
             inlier = log_inlier - 0.5 * (nis + math.log(TWO_PI * s))
             weight = 1.0
@@ -474,8 +478,8 @@ def forward(
                 gain = nu * inv_s
                 for q in range(n):
                     x[q] += v[q] * gain
-                _downdate(P, v, inv_s)
-                _clamp(x, model.lower, model.upper)
+                downdate(P, v, inv_s)
+                clamp(x, model.lower, model.upper)
 
         f = events.fix_row[i]
         if f >= 0:
@@ -484,10 +488,10 @@ def forward(
                 if dtf != last_dt_f:
                     factor_f = math.exp(-dtf / model.fix_tau_s)
                     last_dt_f = dtf
-                _decay(x, P, 8, factor_f, model.fix_coloured_var)
-                _decay(x, P, 9, factor_f, model.fix_coloured_var)
+                decay(x, P, 8, factor_f, model.fix_coloured_var)
+                decay(x, P, 9, factor_f, model.fix_coloured_var)
             memory[MEM_FIX_T] = t
-            nu_e, nu_n, see, snn, sen = _expect_fix(x, P, v, w, events, columns, f, out.antenna)
+            nu_e, nu_n, see, snn, sen = expect_fix(x, P, v, w, events, columns, f, out.antenna)
             ratio = sen / see
             s_n = snn - sen * ratio
             rest_n = nu_n - ratio * nu_e
@@ -534,9 +538,9 @@ def forward(
                     gain_n = rest_n * inv_n
                     for q in range(n):
                         x[q] += v[q] * gain_e + w[q] * gain_n
-                    _downdate(P, v, inv_e)
-                    _downdate(P, w, inv_n)
-                    _clamp(x, model.lower, model.upper)
+                    downdate(P, v, inv_e)
+                    downdate(P, w, inv_n)
+                    clamp(x, model.lower, model.upper)
 
         m = events.out_row[i]
         if m >= 0:
