@@ -15,7 +15,7 @@ from sccal.align import align, build_timeline
 from sccal.calibration.options import CalibrationOptions
 from sccal.filter.forward import Noise
 from sccal.filter.iterate import RunProblem
-from sccal.filter.start import Constants, find_start
+from sccal.filter.start import find_start
 from sccal.logs.run import discover, read_run
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
@@ -70,10 +70,10 @@ def main() -> None:
         show("align it", timed(lambda: align(run)))
         aligned = align(run)
         problem = RunProblem(aligned, build_timeline(aligned), find_start(aligned), NOISE, CalibrationOptions().filter)
-        constants = Constants.nominal(aligned.vehicle)
-        clear = problem.clear_steps(constants)
+        at = problem.at_centre()
+        clear = problem.clear_steps(at.constants)
         events = problem.timeline.t_s.size
-        passes = timed(lambda: problem.begun(constants, None, clear).finish())
+        passes = timed(lambda: problem.begun(at, False, clear).finish())
         show("one pass of the filter", passes, f"{1e9 * passes[1] / events:.0f} ns an event, {events:,} events")
 
         command = [sys.executable, "-m", "sccal", "calibrate", str(folder), "--out", str(Path(name) / "out")]

@@ -84,6 +84,9 @@ def calibrate(
     track_walk: Annotated[float, typer.Option(help="Random walk of the track, ppm per √s.", min=0.0)] = 3.0,
     offset_walk: Annotated[float, typer.Option(help="Random walk of the heading offset, deg per √s.", min=0.0)] = 0.002,
     gate: Annotated[float, typer.Option(help="Reject measurements further off than this, sigmas.", min=1.0)] = 5.0,
+    effects: Annotated[
+        str, typer.Option(help="Estimate these effects too, e.g. lever_arm,soft_iron (see `sccal effects`).")
+    ] = "",
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
     import numpy as np
@@ -107,6 +110,7 @@ def calibrate(
         outage_window_s=window,
         output_rate_hz=rate,
         heading_rate_hz=heading_rate,
+        effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
     )
     batch = calibrate_paths(paths, out, options, _tell)
     width = min(max(shutil.get_terminal_size((100, 24)).columns, 60), 120)
@@ -145,10 +149,15 @@ def simulate(
         list[str] | None,
         typer.Option("--set", help="Any other setting, e.g. ahrs.heading_offset_deg=137 (repeatable; see --list)."),
     ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(help="Put an effect into the log, e.g. lever_arm=0.3,-0.1 (repeatable; see `sccal effects`)."),
+    ] = None,
     show: Annotated[bool, typer.Option("--list", help="List the settings and their defaults.")] = False,
     samples: Annotated[bool, typer.Option("--samples", help="Make the three sample runs in OUT instead.")] = False,
 ) -> None:
     """A tracked robot's logs with known truth: encoder.csv, ahrs.csv, gnss.nmea, vehicle.toml and truth.json."""
+    from sccal.effects.catalogue import parse_effect
     from sccal.simulate.choose import describe_settings, settings_from
     from sccal.simulate.files import write_run, write_samples, write_vehicle_file
     from sccal.simulate.run import simulate_run
@@ -166,10 +175,23 @@ def simulate(
         [f"drive.path={path}", f"drive.duration_s={duration}", *(settings or [])],
         seed,
     )
-    simulated = simulate_run(chosen)
+    chosen_effects = [parse_effect(text) for text in effect or []]
+    simulated = simulate_run(chosen, [one.physics(values) for one, values in chosen_effects])
     write_run(simulated, out)
     write_vehicle_file(chosen, out)
     print(f"a {path} of {duration:g} s in {out}/ (truth in {out / 'truth.json'})")
+
+
+@app.command()
+def effects(
+    name: Annotated[str, typer.Argument(help="Explain this one.", show_default=False)] = "",
+) -> None:
+    """What the model may lack: list the effects of the catalogue, or explain one."""
+    from sccal.effects.catalogue import CATALOGUE, effect_named
+    from sccal.report.effects import effect_text, effects_text
+
+    width = min(max(shutil.get_terminal_size((100, 24)).columns, 60), 120)
+    print(effect_text(effect_named(name), width) if name else effects_text(CATALOGUE.values(), width), end="")
 
 
 if __name__ == "__main__":

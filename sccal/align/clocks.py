@@ -4,7 +4,7 @@ A receiver stamps its epoch in UTC, exactly; the logging computer stamps the arr
 log has both, the epochs are mapped onto the logging clock by a continuous, piecewise linear function through the
 receive times: the jitter is gone, and a logging clock that its time daemon was steering (up to 500 ppm, tenths of a
 second within minutes) is followed. How many corners the function has is decided by the Bayesian information criterion.
-A constant transport delay stays in the mapping; it cannot be told from a latency of the receiver.
+What the fastest lines take to arrive stays in the mapping; it cannot be told from a latency of the receiver.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ DAY_S = 86400.0
 SEGMENTS_S = (120.0, 60.0, 30.0, 15.0, 8.0)
 JITTER_CORRELATION_S = 0.5
 HUBER_ROUNDS = 8
+EARLIEST = 0.02
+"""Lines arrive late, never early: the mapping is laid through the earliest of them, which hurried most."""
 CORNER_COST = 1.5
 """Times what the criterion asks: the corners' places are chosen too, if only from a few grids."""
 
@@ -94,7 +96,7 @@ def _fit_delay(utc_s: Floats, delay_s: Floats) -> tuple[Floats, Floats, float]:
     span = float(np.ptp(utc_s))
     rate = utc_s.size / max(span, 1e-9)
     independent = utc_s.size / max(1.0, rate * JITTER_CORRELATION_S)
-    best: tuple[float, Floats, Floats, float] | None = None
+    best: tuple[float, Floats, Floats, float, float] | None = None
     for segment_s in (np.inf, *SEGMENTS_S):
         count = 2 if np.isinf(segment_s) else round(span / segment_s) + 1
         if count < 2 or (best is not None and count <= best[1].size) or count > independent / 4 + 2:
@@ -105,9 +107,9 @@ def _fit_delay(utc_s: Floats, delay_s: Floats) -> tuple[Floats, Floats, float]:
         laplace = max(float(np.mean(np.abs(residual))), 1e-5)
         score = 2.0 * independent * np.log(laplace) + CORNER_COST * count * np.log(max(independent, 2.0))
         if best is None or score < best[0]:
-            best = (score, knots, fitted, spread)
+            best = (score, knots, fitted, spread, float(np.quantile(residual, EARLIEST)))
     assert best is not None
-    return best[1], best[2] + reference, best[3]
+    return best[1], best[2] + reference + best[4], best[3]
 
 
 def _robust_hat_fit(t_s: Floats, values: Floats, knots: Floats) -> tuple[Floats, Floats]:

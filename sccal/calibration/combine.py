@@ -13,15 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import numpy as np
 
-from sccal.arrays import Floats
+from sccal.arrays import Floats, Ints
+from sccal.calibration.extension import FreeEffects
 from sccal.calibration.outage import summarise
 from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 from sccal.calibration.status import judge
-from sccal.filter.forward import numeric_limits, prior_covariance
-from sccal.filter.iterate import RunProblem
+from sccal.filter.forward import ForwardPass, numeric_limits
+from sccal.filter.iterate import At, RunProblem, reported_covariance, reported_values
 from sccal.filter.start import Constants
 from sccal.logs.streams import Notice
 
@@ -33,22 +35,32 @@ OFFSET_OF_THE_RUN_RAD = np.radians(5.0)
 
 @dataclass(frozen=True)
 class RunLikelihood:
-    """What one run says of R_r, R_l, L, its own pose and offset marginalised, no prior in it."""
+    """What one run says of the shared parameters, its own ones marginalised, no prior of the shared ones in it."""
 
     precision: Floats
-    """(3, 3)"""
+    """(k, k)"""
     vector: Floats
-    """(3,) precision times the run's own best values."""
+    """(k,) precision times the run's own best values."""
+    path: ForwardPass
 
     @classmethod
-    def of(cls, problem: RunProblem, at: Constants) -> RunLikelihood:
-        """From a pass linearised at the given constants."""
-        found = problem.begun(at, linear_at=at).finish()
-        posterior = np.linalg.inv(found.final_covariance[3:6, 3:6])
-        prior = _prior_precision(problem)
+    def of(cls, problem: RunProblem, at: At, shared: Ints) -> RunLikelihood:
+        """From a pass linearised there; shared are the places among R_r, R_l, L and the effects' parameters."""
+        found = problem.begun(at, True).finish()
+        theta = np.concatenate((at.constants.as_array(), at.values))
+        learnt = np.r_[0:3, 4 : 4 + problem.extra]
+        values = reported_values(found)[learnt]
+        covariance = reported_covariance(found)[np.ix_(learnt, learnt)]
+        # The run's own parameters keep their prior about zero: to first order, as in iterate.
+        own = np.setdiff1d(np.arange(theta.size), shared)
+        weight = np.zeros((theta.size, theta.size))
+        weight[np.ix_(own, own)] = np.linalg.inv(problem.prior)[np.ix_(own, own)]
+        values = values + covariance @ weight @ (problem.prior_mean - theta)
+        posterior = np.linalg.inv(covariance[np.ix_(shared, shared)])
+        prior = np.linalg.inv(problem.prior[np.ix_(shared, shared)])
         precision = posterior - prior
-        vector = posterior @ found.final_state[3:6] - prior @ at.as_array()
-        return cls(0.5 * (precision + precision.T), vector)
+        vector = posterior @ values[shared] - prior @ theta[shared]
+        return cls(0.5 * (precision + precision.T), vector, found)
 
 
 def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> VehicleCalibration:
@@ -60,16 +72,25 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         return VehicleCalibration(
             vehicle, only.with_offset, (only,), only.parameters, only.fit, only.outage, None, effects=only.effects
         )
-    prior = _prior_precision(first)
-    centre = np.median([problem.centre.as_array() for problem in problems], axis=0)
+    shared = _shared(first)
+    prior = np.asarray(np.linalg.inv(first.prior[np.ix_(shared, shared)]), dtype=np.float64)
+    centre = np.median([problem.prior_mean[shared] for problem in problems], axis=0)
     lower, upper = numeric_limits(first.centre)
-    at = _rough_mean(runs)
+    at = _rough_mean(runs, first)[shared]
+    own = [_own_values(run, problem) for run, problem in zip(runs, problems, strict=True)]
+    paths: list[ForwardPass | None] = [None] * len(problems)
     for _ in range(MAX_ROUNDS):
-        shared = Constants(*(float(v) for v in at))
-        likelihoods = [RunLikelihood.of(problem, shared) for problem in problems]
+        likelihoods = []
+        for k, problem in enumerate(problems):
+            theta = own[k].copy()
+            theta[shared] = at
+            place = At(Constants(*(float(v) for v in theta[:3])), theta[3:], paths[k])
+            likelihoods.append(RunLikelihood.of(problem, place, shared))
+            paths[k] = likelihoods[-1].path if problem.extra else None
         precision = prior + sum(one.precision for one in likelihoods)
         covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-        mode = np.clip(covariance @ (prior @ centre + sum(one.vector for one in likelihoods)), lower, upper)
+        mode = covariance @ (prior @ centre + sum(one.vector for one in likelihoods))
+        mode[:3] = np.clip(mode[:3], lower, upper)
         moved = np.abs(mode - at) / np.sqrt(np.diag(covariance))
         at = mode
         if moved.max() < CLOSE_SIGMAS:
@@ -78,9 +99,9 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
     covariance = _at_least(covariance, _between_runs(likelihoods, at, covariance))
     offset, notices = _combined_offset(runs)
     full = np.zeros((4, 4))
-    full[:3, :3] = covariance
+    full[:3, :3] = covariance[:3, :3]
     full[3, 3] = offset.sigma**2
-    parameters = judge(np.append(at, offset.value), full, vehicle, options, _pooled_drive(runs))
+    parameters = judge(np.append(at[:3], offset.value), full, vehicle, options, _pooled_drive(runs))
     if chi2_per_dof is not None and chi2_per_dof > INCONSISTENT:
         what = (
             f"runs disagree about radii and track by {np.sqrt(chi2_per_dof):.1f} times what their sigmas allow; the "
@@ -101,20 +122,57 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         ),
         consistency_chi2_per_dof=chi2_per_dof,
         notices=tuple(notices),
+        effects=_shared_effects(first, shared, at, covariance),
     )
 
 
-def _prior_precision(problem: RunProblem) -> Floats:
-    return np.asarray(np.linalg.inv(prior_covariance(problem.centre, problem.options)))
+def _shared(problem: RunProblem) -> Ints:
+    """Places of the shared ones among R_r, R_l, L and the effects' parameters."""
+    scopes = [one.scope for _, one in problem.extension.parameters] if _is_free(problem.extension) else []
+    return np.array([0, 1, 2, *(3 + k for k, scope in enumerate(scopes) if scope == "vehicle")], dtype=np.int64)
 
 
-def _rough_mean(runs: Sequence[Calibration]) -> Floats:
+def _is_free(extension: object) -> TypeGuard[FreeEffects]:
+    return isinstance(extension, FreeEffects)
+
+
+def _shared_effects(
+    problem: RunProblem, shared: Ints, values: Floats, covariance: Floats
+) -> dict[str, dict[str, Estimate]]:
+    """The vehicle's share of the effects; what belongs to runs stands in the runs' own results."""
+    if not _is_free(problem.extension):
+        return {}
+    count = problem.extra
+    whole, spread = np.zeros(count), np.zeros((count, count))
+    places = shared[3:] - 3
+    whole[places] = values[3:]
+    spread[np.ix_(places, places)] = covariance[3:, 3:]
+    kept = {(effect.name, one.name) for k, (effect, one) in enumerate(problem.extension.parameters) if k in places}
+    found = problem.extension.estimates(whole, spread)
+    named = {
+        name: {one: estimate for one, estimate in parameters.items() if (name, one) in kept}
+        for name, parameters in found.items()
+    }
+    return {name: parameters for name, parameters in named.items() if parameters}
+
+
+def _own_values(run: Calibration, problem: RunProblem) -> Floats:
+    """The run's own estimates of R_r, R_l, L and the effects' parameters (3 + m,)."""
+    p = run.parameters
+    effects = problem.extension.parameters if _is_free(problem.extension) else ()
+    return np.array(
+        [
+            p.radius_right_m.value,
+            p.radius_left_m.value,
+            p.track_m.value,
+            *(run.effects[effect.name][one.name].value for effect, one in effects),
+        ]
+    )
+
+
+def _rough_mean(runs: Sequence[Calibration], problem: RunProblem) -> Floats:
     """Median over the runs: good enough to linearise at."""
-    values = [
-        [run.parameters.radius_right_m.value, run.parameters.radius_left_m.value, run.parameters.track_m.value]
-        for run in runs
-    ]
-    return np.asarray(np.median(values, axis=0))
+    return np.asarray(np.median([_own_values(run, problem) for run in runs], axis=0))
 
 
 def _consistency(likelihoods: Sequence[RunLikelihood], at: Floats, prior: Floats) -> float | None:

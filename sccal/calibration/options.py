@@ -19,3 +19,5 @@ class CalibrationOptions:
     """Readings beyond this rate are left out: an AHRS's error changes more slowly."""
     noise: Noise | None = None
     """None: estimated from the log."""
+    effects: tuple[str, ...] = ()
+    """Names of effects beyond the paper's model that the filter estimates too."""

@@ -10,11 +10,13 @@ import numpy as np
 
 from sccal.align import Aligned, align, build_timeline
 from sccal.arrays import Floats
+from sccal.calibration.extension import FreeEffects
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import run_with_outages
 from sccal.calibration.result import (
     Calibration,
     Drive,
+    Estimate,
     Fit,
     Fixes,
     History,
@@ -23,9 +25,9 @@ from sccal.calibration.result import (
 )
 from sccal.calibration.status import judge
 from sccal.filter.forward import ForwardPass
-from sccal.filter.iterate import RunProblem, iterate
+from sccal.filter.iterate import At, RunProblem, iterate, reported_covariance, reported_values
 from sccal.filter.noise import estimate_noise
-from sccal.filter.start import ODD_SCALE, Constants, find_start, first_constants
+from sccal.filter.start import ODD_SCALE, Constants, find_start
 from sccal.logs.streams import Notice, Run
 
 SETTLED_S = 20.0
@@ -38,10 +40,11 @@ def prepare(run: Run, options: CalibrationOptions) -> RunProblem:
     aligned = align(run)
     start = find_start(aligned)
     noise = options.noise
+    extension = FreeEffects.named(options.effects)
     if noise is None:
-        noise = estimate_noise(aligned, start, options.filter, options.heading_rate_hz)
+        noise = estimate_noise(aligned, start, options.filter, options.heading_rate_hz, extension)
     timeline = build_timeline(aligned, options.output_rate_hz, options.heading_rate_hz)
-    return RunProblem(aligned, timeline, start, noise, options.filter)
+    return RunProblem(aligned, timeline, start, noise, options.filter, extension)
 
 
 def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, RunProblem]:
@@ -49,12 +52,13 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     problem = prepare(run, options)
     aligned, start = problem.aligned, problem.start
 
-    forward = problem.begun(first_constants(aligned, start))
+    forward = problem.begun(problem.at_centre())
     outage = run_with_outages(forward, aligned, start, options.outage_window_s)
     honest = forward.finish()
 
-    values, final = iterate(problem, Constants.of(honest.final_state))
-    covariance = final.final_covariance[3:7, 3:7]
+    learnt = reported_values(honest)
+    values, final = iterate(problem, At(Constants.of(honest.final_state), learnt[4:], honest))
+    covariance = reported_covariance(final)
     if options.filter.with_offset:
         covariance[3, 3] += _variance_of_the_level(problem)
     drive = describe_drive(aligned, float(values[:2].mean()))
@@ -63,7 +67,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             run=run.name,
             vehicle=aligned.vehicle,
             with_offset=options.filter.with_offset,
-            parameters=judge(values, covariance, aligned.vehicle, options.filter, drive),
+            parameters=judge(values[:4], covariance[:4, :4], aligned.vehicle, options.filter, drive),
             origin_lat_deg=aligned.plane.lat_deg,
             origin_lon_deg=aligned.plane.lon_deg,
             fit=measure_fit(problem, final),
@@ -76,9 +80,15 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             residuals=_residuals(problem, final),
             fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
             notices=(*aligned.notices, *_doubts(problem, final)),
+            effects=_effects(problem, values[4:], covariance[4:, 4:]),
         ),
         problem,
     )
+
+
+def _effects(problem: RunProblem, values: Floats, covariance: Floats) -> dict[str, dict[str, Estimate]]:
+    extension = problem.extension
+    return extension.estimates(values, covariance) if isinstance(extension, FreeEffects) else {}
 
 
 def measure_fit(problem: RunProblem, found: ForwardPass) -> Fit:

@@ -2,11 +2,62 @@
 
 from __future__ import annotations
 
+from sccal.effects.base_shift import BaseShift
+from sccal.effects.brake_slip import BrakeSlip
+from sccal.effects.clock_skew import ClockSkew
+from sccal.effects.drive_slip import DriveSlip
+from sccal.effects.eccentric import EccentricLeft, EccentricRight
 from sccal.effects.effect import Effect
+from sccal.effects.gnss_latency import GnssLatency
+from sccal.effects.hard_iron import HardIron
+from sccal.effects.heading_drift import HeadingDrift
+from sccal.effects.heading_latency import HeadingLatency
+from sccal.effects.heading_step import HeadingStep
 from sccal.effects.lever_arm import LeverArm
+from sccal.effects.local_field import LocalField
+from sccal.effects.missed import MissedLeft, MissedRight
+from sccal.effects.radius_drift import RadiusDrift
+from sccal.effects.radius_step import RadiusStep
+from sccal.effects.roll_slip import RollSlip
+from sccal.effects.side_slip import SideSlip
+from sccal.effects.slope import Slope
+from sccal.effects.soft_iron import SoftIron
+from sccal.effects.speed_field import SpeedField
+from sccal.effects.speed_slip import SpeedSlip
+from sccal.effects.turn_scrub import TurnScrub
+from sccal.effects.turn_slip import TurnSlip
 from sccal.errors import UsageError
 
-CATALOGUE: dict[str, Effect] = {effect.name: effect for effect in (LeverArm(),)}
+CATALOGUE: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (
+        LeverArm(),
+        TurnSlip(),
+        TurnScrub(),
+        SideSlip(),
+        SpeedSlip(),
+        BrakeSlip(),
+        DriveSlip(),
+        Slope(),
+        RollSlip(),
+        RadiusDrift(),
+        RadiusStep(),
+        EccentricLeft(),
+        EccentricRight(),
+        MissedLeft(),
+        MissedRight(),
+        GnssLatency(),
+        HeadingLatency(),
+        ClockSkew(),
+        HardIron(),
+        SoftIron(),
+        HeadingDrift(),
+        SpeedField(),
+        HeadingStep(),
+        BaseShift(),
+        LocalField(),
+    )
+}
 
 
 def effect_named(name: str) -> Effect:

@@ -65,9 +65,10 @@ class Effect(ABC):
 
     @abstractmethod
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
-        """Columns of all parameters that are not shapes; ``at`` holds current values (file units), for those that are.
+        """Columns of all parameters that are not shapes; ``at`` holds the current values of all (file units).
 
-        Where the effect is not linear, they are the derivatives at those values.
+        Where the effect is not linear, a column is its derivative at zero and its secant elsewhere: value times column
+        is the whole effect at ``at``, so refitting with columns made at the last answer converges to the exact effect.
         """
 
     @abstractmethod

@@ -8,9 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
+from sccal.align import Timeline
 from sccal.arrays import Floats
 from sccal.filter import layout
-from sccal.filter.layout import Columns, Events
+from sccal.filter.layout import Columns
 
 MOTION_PORTS = {
     "along": layout.PORT_ALONG,
@@ -45,7 +46,7 @@ class Placed:
     column: ColumnLike
 
 
-def kernel_columns(placed: Sequence[Placed], events: Events) -> Columns:
+def kernel_columns(placed: Sequence[Placed], timeline: Timeline) -> Columns:
     """The kernel's columns; the rows of each column must be those of its port."""
 
     def stack(chosen: list[Placed], rows: int) -> Floats:
@@ -55,12 +56,12 @@ def kernel_columns(placed: Sequence[Placed], events: Events) -> Columns:
     heading = [one for one in placed if one.column.port == "heading"]
     fix = [one for one in placed if one.column.port in FIX_PORTS]
     return Columns(
-        motion=stack(motion, events.t_s.size),
+        motion=stack(motion, timeline.t_s.size),
         motion_port=np.array([MOTION_PORTS[one.column.port] for one in motion], dtype=np.int32),
         motion_param=np.array([one.parameter for one in motion], dtype=np.int32),
-        heading=stack(heading, events.yaw_rad.size),
+        heading=stack(heading, timeline.heading_index.size),
         heading_param=np.array([one.parameter for one in heading], dtype=np.int32),
-        fix=stack(fix, events.fix_east_m.size),
+        fix=stack(fix, timeline.fix_index.size),
         fix_port=np.array([FIX_PORTS[one.column.port] for one in fix], dtype=np.int32),
         fix_param=np.array([one.parameter for one in fix], dtype=np.int32),
     )

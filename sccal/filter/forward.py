@@ -13,6 +13,7 @@ from sccal.align import Aligned, Timeline
 from sccal.arrays import Bools, Floats
 from sccal.compiled import is_compiled
 from sccal.filter import kernel
+from sccal.filter.columns import kernel_columns
 from sccal.filter.layout import (
     BASE_STATES,
     MEM_FIX_T,
@@ -105,7 +106,7 @@ class Filter:
         self.options = options
         self.states = BASE_STATES + effects
         self.events = make_events(aligned, timeline, noise, clear)
-        self.columns = no_columns(self.events) if columns is None else columns
+        self.columns = kernel_columns((), timeline) if columns is None else columns
         self.model = make_model(centre, options, noise, self.states, linear_at)
         self.output = self.make_output(with_states=True)
         self.x = np.zeros(self.states)
@@ -131,14 +132,18 @@ class Filter:
             total=np.zeros(2),
         )
 
-    def begin(self, start: Start, constants: Constants, prior: Floats) -> None:
-        """Set state and covariance at the first event; prior is the covariance of R_r, R_l, L (3, 3)."""
+    def begin(self, start: Start, constants: Constants, prior: Floats, values: Floats) -> None:
+        """Set state and covariance at the first event.
+
+        prior is the covariance of R_r, R_l, L and the effects' parameters (3 + m, 3 + m), values these parameters (m,).
+        """
         options = self.options
         offset = start.offset_rad if options.with_offset else 0.0
         self.x[:] = 0.0
         self.x[:3] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
         self.x[3:6] = constants.as_array()
         self.x[6] = offset
+        self.x[BASE_STATES:] = values
         variance = np.zeros(self.states)
         variance[:2] = start.sigma_position_m**2
         variance[2] = start.sigma_yaw_rad**2
@@ -146,7 +151,8 @@ class Filter:
         variance[7] = self.model.heading_coloured_var
         variance[8:10] = self.model.fix_coloured_var
         self.P[:] = np.diag(variance)
-        self.P[3:6, 3:6] = prior
+        learnt = np.r_[3:6, BASE_STATES : self.states]
+        self.P[np.ix_(learnt, learnt)] = prior
         self.memory[:] = 0.0
         self.memory[: MEM_FIX_T + 1] = self.events.t_s[0]
         self.output.total[:] = 0.0
@@ -273,19 +279,4 @@ def make_events(aligned: Aligned, timeline: Timeline, noise: Noise, clear: tuple
         fix_var_east_m2=aligned.fix_var_east_m2[fix] * scale2,
         fix_var_north_m2=aligned.fix_var_north_m2[fix] * scale2,
         fix_cov_m2=aligned.fix_cov_m2[fix] * scale2,
-    )
-
-
-def no_columns(events: Events) -> Columns:
-    """The model without effects."""
-    none = np.zeros(0, dtype=np.int32)
-    return Columns(
-        motion=np.zeros((events.t_s.size, 0)),
-        motion_port=none,
-        motion_param=none,
-        heading=np.zeros((events.yaw_rad.size, 0)),
-        heading_param=none,
-        fix=np.zeros((events.fix_east_m.size, 0)),
-        fix_port=none,
-        fix_param=none,
     )

@@ -255,6 +255,7 @@ def downdate(P: Floats, v: Floats, inv_s: float) -> None:
 
 @compiled
 def clamp(x: Floats, lower: Floats, upper: Floats) -> None:
+    """Hold R_r, R_l and L within their numeric limits."""
     for k in range(3):
         if x[3 + k] < lower[k]:
             x[3 + k] = lower[k]

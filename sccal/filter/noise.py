@@ -22,7 +22,8 @@ from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
 from sccal.arrays import Bools, Floats
 from sccal.filter.forward import Noise
-from sccal.filter.iterate import RunProblem, iterate
+from sccal.filter.iterate import At, Extension, RunProblem, iterate
+from sccal.filter.layout import Columns
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, coarse_constants, path_along_yaw
 
@@ -64,38 +65,46 @@ def _scales(fix_sigma_m: float) -> tuple[_Scale, ...]:
     )
 
 
-def estimate_noise(aligned: Aligned, start: Start, options: FilterOptions, heading_rate_hz: float) -> Noise:
+def estimate_noise(
+    aligned: Aligned,
+    start: Start,
+    options: FilterOptions,
+    heading_rate_hz: float,
+    extension: Extension | None = None,
+) -> Noise:
     """The log's own noise: first rough constants under assumed noise, then the noise given them.
 
     A coarse search over thinned measurements finds the right hill (a correlated fix error and a slipping wheel can
     both carry the blame); a fine one over all of them then settles what their number changes: white levels and slip.
     """
     soft = replace(options, soft_gate=True)
-    likelihood = _Likelihood(aligned, start, soft)
+    likelihood = _Likelihood(aligned, start, soft, extension)
     begin = aligned.span_s[0]
     still = start.moving_from_s - begin
     stretch = (begin, (start.moving_from_s if still > 0.25 * STRETCH_S else begin) + STRETCH_S)
     coarse = build_timeline(aligned, 0.01, 2.0, 1.0, stretch, 5.0)
     fine = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
 
-    rough = coarse_constants(aligned, start)
+    rough = likelihood.problem(coarse, likelihood.centre).at_centre(coarse_constants(aligned, start))
     promising = likelihood.best_of(coarse, likelihood.hills(), rough)[:SETTLED_HILLS]
     settled = [(likelihood.settled(coarse, hill, rough), hill) for hill in promising]
-    (cost, constants), level = min(settled, key=lambda one: one[0][0])
+    (cost, at), level = min(settled, key=lambda one: one[0][0])
     for _ in range(MAX_CLIMBS):
-        level = likelihood.climb(coarse, level, constants)
+        level = likelihood.climb(coarse, level, at)
         before = cost
-        cost, constants = likelihood.settled(coarse, level, constants)
+        cost, at = likelihood.settled(coarse, level, at)
         if cost > before - WORTH_ANOTHER_CLIMB:
             break
-    return likelihood.noise(likelihood.climb_smoothly(fine, level, constants))
+    return likelihood.noise(likelihood.climb_smoothly(fine, level, at))
 
 
 class _Likelihood:
     """Negative log-posterior of the noise levels' logarithms for one run."""
 
-    def __init__(self, aligned: Aligned, start: Start, options: FilterOptions) -> None:
-        self.aligned, self.start, self.options = aligned, start, options
+    def __init__(
+        self, aligned: Aligned, start: Start, options: FilterOptions, extension: Extension | None = None
+    ) -> None:
+        self.aligned, self.start, self.options, self.extension = aligned, start, options, extension
         self.fix_sigma_m = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
         scales = _scales(self.fix_sigma_m)
         self.centre = np.log([s.centre for s in scales])
@@ -128,50 +137,54 @@ class _Likelihood:
         return points
 
     def problem(self, timeline: Timeline, logs: Floats) -> RunProblem:
-        return RunProblem(self.aligned, timeline, self.start, self.noise(logs), self.options)
+        return RunProblem(self.aligned, timeline, self.start, self.noise(logs), self.options, self.extension)
 
-    def cost(self, problem: RunProblem, logs: Floats, constants: Constants, clear: tuple[Floats, Floats]) -> float:
-        found = problem.begun(constants, constants, clear).finish()
+    def cost(
+        self, problem: RunProblem, logs: Floats, at: At, clear: tuple[Floats, Floats], columns: Columns | None = None
+    ) -> float:
+        found = problem.begun(at, True, clear, columns).finish()
         prior = 0.5 * float((((logs - self.centre) / self.width)[self.free] ** 2).sum())
         value = found.nll_heading + found.nll_fix + prior
         return value if np.isfinite(value) else 1e12
 
-    def settled(self, timeline: Timeline, logs: Floats, constants: Constants) -> tuple[float, Constants]:
+    def settled(self, timeline: Timeline, logs: Floats, at: At) -> tuple[float, At]:
         """Cost at given noise with the constants fitted to it, and these."""
         problem = self.problem(timeline, logs)
-        mode, _ = iterate(problem, constants, max_rounds=2)
-        candidates = (constants, Constants(*(float(v) for v in mode[:3])))
-        costs = [self.cost(problem, logs, one, problem.clear_steps(one)) for one in candidates]
+        mode, found = iterate(problem, at, max_rounds=2)
+        fitted = At(Constants(*(float(v) for v in mode[:3])), mode[4:], found if problem.extra else None)
+        candidates = (at, fitted)
+        costs = [self.cost(problem, logs, one, problem.clear_steps(one.constants)) for one in candidates]
         better = int(np.argmin(costs))
         return costs[better], candidates[better]
 
-    def best_of(self, timeline: Timeline, points: list[Floats], constants: Constants) -> list[Floats]:
+    def best_of(self, timeline: Timeline, points: list[Floats], at: At) -> list[Floats]:
         """The points in order of their cost at the given constants."""
-        cost = self._cost_of_free(timeline, points[0], constants)
+        cost = self._cost_of_free(timeline, points[0], at)
         return sorted(points, key=lambda point: cost(point[self.free]))
 
-    def climb(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
+    def climb(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
         """The most likely levels from a far starting point, the constants' linearisation fixed (Powell)."""
-        cost = self._cost_of_free(timeline, logs, constants)
+        cost = self._cost_of_free(timeline, logs, at)
         start = logs[self.free]
         # Its line searches look at the whole range between the bounds, which far away holds other hills.
         limits = [
-            (max(low, at - REACH), min(high, at + REACH)) for (low, high), at in zip(self._limits(), start, strict=True)
+            (max(low, here - REACH), min(high, here + REACH))
+            for (low, high), here in zip(self._limits(), start, strict=True)
         ]
         options = {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4}
         found = minimize(cost, start, method="Powell", bounds=limits, options=options)
         return self._with_free(logs, found.x) if found.fun < cost(start) else logs
 
-    def climb_smoothly(self, timeline: Timeline, logs: Floats, constants: Constants) -> Floats:
+    def climb_smoothly(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
         """The fast levels from a near point (L-BFGS-B). The kernel frees the GIL, so differences share the cores."""
         fast = np.isin(np.arange(logs.size), FAST)
 
         def with_fast(part: Floats) -> Floats:
-            at = logs.copy()
-            at[fast] = part
-            return at
+            level = logs.copy()
+            level[fast] = part
+            return level
 
-        whole = self._cost_of_free(timeline, logs, constants)
+        whole = self._cost_of_free(timeline, logs, at)
         with ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, 4)) as pool:
 
             def cost_and_slope(part: Floats) -> tuple[float, Floats]:
@@ -184,12 +197,14 @@ class _Likelihood:
             found = minimize(cost_and_slope, logs[fast], jac=True, method="L-BFGS-B", bounds=limits, options=options)
         return with_fast(found.x)
 
-    def _cost_of_free(self, timeline: Timeline, logs: Floats, constants: Constants) -> Callable[[Floats], float]:
-        clear = self.problem(timeline, logs).clear_steps(constants)
+    def _cost_of_free(self, timeline: Timeline, logs: Floats, at: At) -> Callable[[Floats], float]:
+        problem = self.problem(timeline, logs)
+        clear = problem.clear_steps(at.constants)
+        columns = problem.columns(at)
 
         def cost(part: Floats) -> float:
-            at = self._with_free(logs, part)
-            return self.cost(self.problem(timeline, at), at, constants, clear)
+            level = self._with_free(logs, part)
+            return self.cost(self.problem(timeline, level), level, at, clear, columns)
 
         return cost
 

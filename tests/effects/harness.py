@@ -139,7 +139,7 @@ def innovations(log: Injected, effect: str, held: Mapping[str, float]) -> tuple[
     model = run.model._replace(walk=np.zeros(states))
     kernel.forward(
         run.events,
-        kernel_columns(placed, run.events),
+        kernel_columns(placed, log.timeline),
         model,
         x,
         np.zeros((states, states)),

@@ -15,8 +15,34 @@ from tests.effects.harness import injected, innovations
 
 SIZES: dict[str, tuple[float, ...]] = {
     "lever_arm": (0.3, -0.1),
+    "turn_slip": (0.2,),
+    "turn_scrub": (0.1,),
+    "side_slip": (0.1,),
+    "speed_slip": (0.03,),
+    "brake_slip": (0.05,),
+    "drive_slip": (0.05,),
+    "slope": (1.0,),
+    "roll_slip": (0.1,),
+    "radius_drift": (0.1,),
+    "radius_step": (0.02, 60.0),
+    "eccentric_left": (0.01, 0.02),
+    "eccentric_right": (0.01, 0.02),
+    "missed_left": (0.02,),
+    "missed_right": (0.02,),
+    "gnss_latency": (0.15,),
+    "heading_latency": (0.15,),
+    "clock_skew": (300.0,),
+    "hard_iron": (8.0, -12.0),
+    "soft_iron": (3.0, -2.0),
+    "heading_drift": (20.0,),
+    "speed_field": (4.0,),
+    "heading_step": (5.0, 60.0),
+    "base_shift": (0.5, -0.3, 60.0),
+    "local_field": (15.0, -24.4, -9.0, 3.0),
 }
 """Of each effect as in the field, parameters in order."""
+DURATIONS_S = {"clock_skew": 240.0}
+"""Of the drives on which an effect needs longer to show."""
 LEFT_OVER = 0.05
 """Share of the effect's innovation that may stay: terms of second order and the filter's own discretisation."""
 
@@ -42,7 +68,7 @@ def scaled(name, factor):
 @each_effect
 def test_held_at_the_truth_it_explains_what_it_does(name):
     truth = scaled(name, 1.0)
-    log = injected(name, truth)
+    log = injected(name, truth, duration_s=DURATIONS_S.get(name, 120.0))
     nothing = tuple(0.0 if not p.shape else v for p, v in zip(CATALOGUE[name].parameters, truth, strict=True))
     without = innovations(log, name, named(name, nothing))
     with_it = innovations(log, name, named(name, truth))
@@ -54,7 +80,7 @@ def test_held_at_the_truth_it_explains_what_it_does(name):
 @each_effect
 def test_the_wrong_sign_makes_it_worse(name):
     truth = scaled(name, 1.0)
-    log = injected(name, truth)
+    log = injected(name, truth, duration_s=DURATIONS_S.get(name, 120.0))
     against = innovations(log, name, named(name, scaled(name, -1.0)))
     nothing = innovations(log, name, named(name, scaled(name, 0.0)))
     worse = [rms(a) / max(rms(b), 1e-4) for a, b in zip(against, nothing, strict=True)]

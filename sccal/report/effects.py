@@ -1,0 +1,36 @@
+"""The catalogue of effects for the terminal: a line each, or one in full."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable
+
+from sccal.effects.effect import Effect
+
+
+def effects_text(effects: Iterable[Effect], width: int = 100) -> str:
+    """One line an effect: name, parameters with units, what it is."""
+    rows = [(effect.name, ", ".join(one.name for one in effect.parameters), effect.title) for effect in effects]
+    names = max(len(name) for name, _, _ in rows)
+    parameters = max(len(text) for _, text, _ in rows)
+    lines = [f"{name:<{names}}  {text:<{parameters}}  {title}".rstrip() for name, text, title in rows]
+    return "\n".join(line if len(line) <= width else line[: width - 1] + "…" for line in lines) + "\n"
+
+
+def effect_text(effect: Effect, width: int = 100) -> str:
+    """One effect in full."""
+    lines = [f"{effect.name}: {effect.title}", ""]
+    for one in effect.parameters:
+        kind = "searched for" if one.shape else f"prior ± {one.prior_sigma:g}"
+        bounds = f"{one.lower:g} … {one.upper:g}"
+        lines.append(f"  {one.name:<12} {one.unit:<14} {kind}, {bounds}, one for each {one.scope}")
+    lines.append("")
+    for label, text in (
+        ("looks like", effect.looks_like),
+        ("drive", effect.excited_by),
+        ("source", effect.reference),
+    ):
+        lines += textwrap.wrap(text, width, initial_indent=f"{label:<11}", subsequent_indent=" " * 11)
+    example = ",".join(one.name for one in effect.parameters)
+    lines += ["", f"put it into a simulated log: sccal simulate OUT --effect {effect.name}={example}"]
+    return "\n".join(lines) + "\n"
