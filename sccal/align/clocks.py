@@ -24,6 +24,7 @@ SEGMENTS_S = (120.0, 60.0, 30.0, 15.0, 8.0)
 JITTER_CORRELATION_S = 0.5
 HUBER_ROUNDS = 8
 EARLIEST = 0.02
+HURRY_SPREADS = 6.0
 """Lines arrive late, never early: the mapping is laid through the earliest of them, which hurried most."""
 CORNER_COST = 1.5
 """Times what the criterion asks: the corners' places are chosen too, if only from a few grids."""
@@ -107,9 +108,14 @@ def _fit_delay(utc_s: Floats, delay_s: Floats) -> tuple[Floats, Floats, float]:
         laplace = max(float(np.mean(np.abs(residual))), 1e-5)
         score = 2.0 * independent * np.log(laplace) + CORNER_COST * count * np.log(max(independent, 2.0))
         if best is None or score < best[0]:
-            best = (score, knots, fitted, spread, float(np.quantile(residual, EARLIEST)))
+            best = (score, knots, fitted, spread, _earliest(residual, spread))
     assert best is not None
     return best[1], best[2] + reference + best[4], best[3]
+
+
+def _earliest(residual: Floats, spread: float) -> float:
+    """How much before the middle the earliest lines come; stamps of a clock that stepped are no lines in a hurry."""
+    return float(np.quantile(residual[np.abs(residual) <= HURRY_SPREADS * spread], EARLIEST))
 
 
 def _robust_hat_fit(t_s: Floats, values: Floats, knots: Floats) -> tuple[Floats, Floats]:
