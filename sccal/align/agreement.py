@@ -76,10 +76,7 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     t_s = np.arange(aligned.fix_t_s[rows[0]], aligned.fix_t_s[rows[-1]], MOVE_WINDOW_S)
     if t_s.size < FEWEST_MOVES:
         return []
-    yaw = np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad)
-    steps = np.diff(aligned.travel_m) * np.exp(0.5j * (yaw[1:] + yaw[:-1]))
-    path = np.concatenate(([0.0], np.cumsum(steps)))
-    by_wheels = np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, path)))
+    by_wheels = np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.path_along_yaw)))
     fixes = aligned.fix_east_m[rows] + 1j * aligned.fix_north_m[rows]
     by_fixes = np.abs(np.diff(np.interp(t_s, aligned.fix_t_s[rows], fixes)))
     watched = np.diff(np.interp(t_s, aligned.fix_t_s[rows], np.arange(rows.size))) > 0.5

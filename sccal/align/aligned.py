@@ -15,8 +15,9 @@ from sccal.align.accuracy import (
 )
 from sccal.align.agreement import check_agreement
 from sccal.align.clocks import Clock, fixes_on_host_clock, require_overlap
+from sccal.align.path import laid_out
 from sccal.align.signs import check_signs
-from sccal.arrays import Bools, Floats, Ints
+from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
@@ -64,6 +65,16 @@ class Aligned:
     def travel_m(self) -> Floats:
         """Signed distance of the middle between the wheels (n,), with the nominal radius."""
         return self.vehicle.wheel_radius_m * 0.5 * (self.right_rad + self.left_rad)
+
+    @property
+    def yaw_at_wheels_rad(self) -> Floats:
+        """The AHRS reading at the wheels' times (n,)."""
+        return np.interp(self.wheel_t_s, self.heading_t_s, self.yaw_rad)
+
+    @property
+    def path_along_yaw(self) -> Complexes:
+        """The wheels' signed travel laid out along the AHRS yaw, (n,) complex metres from 0, at the wheels' times."""
+        return laid_out(self.travel_m, self.yaw_at_wheels_rad)
 
 
 def yaw_to_enu(yaw_rad: Floats, convention: Convention) -> Floats:

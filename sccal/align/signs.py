@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sccal.align.path import laid_out
 from sccal.arrays import Complexes, Floats
 from sccal.errors import DataError
 
@@ -156,7 +157,7 @@ def _check_turning(aligned: Aligned) -> None:
     convention = aligned.vehicle.convention
     other = "ned" if convention == "enu" else "enu"
     wheels_fit = _turns_as_the_fixes_do(aligned, wheel_turn(aligned, aligned.wheel_t_s))
-    yaw_fits = _turns_as_the_fixes_do(aligned, np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad))
+    yaw_fits = _turns_as_the_fixes_do(aligned, aligned.yaw_at_wheels_rad)
     seen = (
         f"the AHRS yaw turns against the wheels (slope {yaw_on_wheels.value:+.2f}, "
         f"correlation {yaw_on_wheels.correlation:+.2f} over {yaw_on_wheels.windows} s)"
@@ -179,8 +180,7 @@ def _turns_as_the_fixes_do(aligned: Aligned, turn_rad: Floats) -> bool | None:
     A path and its mirror image differ however they are turned, shifted and scaled, so the zero of the heading does not
     matter, nor does driving in reverse. Stretches are short enough that a wrong track does not bend them out of shape.
     """
-    middle = 0.5 * (turn_rad[1:] + turn_rad[:-1])
-    path = np.concatenate(([0.0], np.cumsum(np.diff(aligned.travel_m) * np.exp(1j * middle))))
+    path = laid_out(aligned.travel_m, turn_rad)
     fix_t_s = aligned.fix_t_s[aligned.fix_leading]
     fixes = (aligned.fix_east_m + 1j * aligned.fix_north_m)[aligned.fix_leading]
     p = np.interp(fix_t_s, aligned.wheel_t_s, path)

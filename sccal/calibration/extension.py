@@ -16,7 +16,6 @@ from sccal.errors import UsageError
 from sccal.filter.columns import Placed, kernel_columns
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import Columns
-from sccal.filter.start import path_along_yaw
 
 UNOBSERVED_RATIO = 0.5
 
@@ -88,7 +87,7 @@ def _belief(problem: RunProblem, at: At) -> Belief:
         t_s, east, north, yaw = at.path.timeline.out_t_s, state[:, 0], state[:, 1], state[:, 2]
     if at.path is None or t_s.size < MIN_PATH:
         aligned = problem.aligned
-        turned = start.wheel_scale * np.exp(-1j * start.offset_rad) * path_along_yaw(aligned)
+        turned = start.wheel_scale * np.exp(-1j * start.offset_rad) * aligned.path_along_yaw
         t_s = aligned.wheel_t_s
         east, north = start.east_m + turned.real, start.north_m + turned.imag
         yaw = np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad) - start.offset_rad

@@ -25,7 +25,7 @@ from sccal.filter.forward import Noise
 from sccal.filter.iterate import At, Extension, RunProblem, iterate
 from sccal.filter.layout import Columns
 from sccal.filter.options import FilterOptions
-from sccal.filter.start import Constants, Start, coarse_constants, path_along_yaw
+from sccal.filter.start import Constants, Start, coarse_constants
 
 STRETCH_S = 600.0
 WHEEL_RATE_HZ = 20.0
@@ -227,7 +227,7 @@ def _white_level_m(aligned: Aligned, start: Start, rows: Bools) -> float:
         return float("nan")
     t_s = aligned.fix_t_s[index]
     turn = start.wheel_scale * np.exp(-1j * start.offset_rad)
-    path = turn * np.interp(t_s, aligned.wheel_t_s, path_along_yaw(aligned))
+    path = turn * np.interp(t_s, aligned.wheel_t_s, aligned.path_along_yaw)
     second = np.diff(aligned.fix_east_m[index] + 1j * aligned.fix_north_m[index] - path, n=2)
     regular = second[t_s[2:] - t_s[:-2] < 2.5 * float(np.median(t_s[2:] - t_s[:-2]))]
     parts = np.concatenate((regular.real, regular.imag))

@@ -77,7 +77,7 @@ def find_start(aligned: Aligned) -> Start:
     """The start of one run. Raises DataError where the robot hardly moves."""
     travel = aligned.travel_m
     turned_m = 0.5 * aligned.vehicle.wheel_radius_m * (aligned.right_rad - aligned.left_rad)
-    path = path_along_yaw(aligned)
+    path = aligned.path_along_yaw
     fixes = aligned.fix_east_m + 1j * aligned.fix_north_m
     path_at_fixes = np.interp(aligned.fix_t_s, aligned.wheel_t_s, path)
     sigma = np.sqrt(aligned.fix_var_east_m2 + aligned.fix_var_north_m2)
@@ -123,13 +123,6 @@ def find_start(aligned: Aligned) -> Start:
         moving_from_s=moving_from,
         until_s=min(until, last),
     )
-
-
-def path_along_yaw(aligned: Aligned) -> Complexes:
-    """The wheels' signed travel laid out along the AHRS yaw, (n,) complex metres from 0, at the wheels' times."""
-    yaw = np.interp(aligned.wheel_t_s, aligned.heading_t_s, aligned.yaw_rad)
-    middle = 0.5 * (yaw[1:] + yaw[:-1])
-    return np.concatenate(([0.0], np.cumsum(np.diff(aligned.travel_m) * np.exp(1j * middle))))
 
 
 def first_constants(aligned: Aligned, start: Start) -> Constants:
