@@ -35,9 +35,8 @@ STANDING_MPS = 0.02
 MANY_REJECTED = 0.05
 
 
-def prepare(run: Run, options: CalibrationOptions) -> RunProblem:
-    """Align one run and find its start and noise. Raises DataError where that is impossible."""
-    aligned = align(run)
+def prepare(aligned: Aligned, options: CalibrationOptions) -> RunProblem:
+    """Find the start and the noise of one aligned run. Raises DataError where that is impossible."""
     start = find_start(aligned)
     noise = options.noise
     extension = FreeEffects.named(options.effects)
@@ -49,8 +48,10 @@ def prepare(run: Run, options: CalibrationOptions) -> RunProblem:
 
 def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, RunProblem]:
     """Calibrate one run. Raises DataError where the data cannot support it."""
-    problem = prepare(run, options)
-    aligned, start = problem.aligned, problem.start
+    aligned = align(run)
+    del run  # an hour of raw streams is not needed any more, and as large as all that follows
+    problem = prepare(aligned, options)
+    start = problem.start
 
     forward = problem.begun(problem.at_centre())
     outage = run_with_outages(forward, aligned, start, options.outage_window_s)
@@ -64,7 +65,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     drive = describe_drive(aligned, float(values[:2].mean()))
     return (
         Calibration(
-            run=run.name,
+            run=aligned.name,
             vehicle=aligned.vehicle,
             with_offset=options.filter.with_offset,
             parameters=judge(values[:4], covariance[:4, :4], aligned.vehicle, options.filter, drive),
