@@ -76,7 +76,7 @@ def _judged(effect: Effect, parameter: Parameter, value: float, sigma: float) ->
     elif not parameter.lower < value < parameter.upper:
         status = "at_bound"
         reason = f"{effect.name} {parameter.name} beyond {parameter.lower:g} … {parameter.upper:g} {parameter.unit}"
-    return Estimate(value, sigma, status, reason, 0.0, parameter.prior_sigma)
+    return Estimate(value, sigma, status, reason, None, parameter.prior_sigma)
 
 
 def _belief(problem: RunProblem, at: At) -> Belief:

@@ -27,12 +27,12 @@ from sccal.filter.layout import Columns
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, coarse_constants
 
-STRETCH_S = 600.0
+STRETCH_S = 480.0
 WHEEL_RATE_HZ = 20.0
 FIX_RATE_HZ = 5.0
 MAX_CLIMBS = 3
 WORTH_ANOTHER_CLIMB = 5.0
-SETTLED_HILLS = 4
+SETTLED_HILLS = 3
 FAST = (0, 3, 4, 6)
 """White heading, both levels of the fixes and slip, among Noise's fields: what a thinned log shows least well."""
 DIFFERENCE = 0.02

@@ -82,7 +82,7 @@ def parameter_rows(parameters: Parameters) -> tuple[Row, Row, Row, Row]:
 def effect_rows(effects: Mapping[str, Mapping[str, Estimate]]) -> tuple[Row, ...]:
     """Effects beyond the model; their parameters' names already carry the unit of a file."""
     return tuple(
-        Row(f"{effect}.{name}", f"{effect} {name}".replace("_", " "), _unit_of(name), estimate)
+        Row(f"{effect}.{name}", f"{effect} {_without_unit(name)}".replace("_", " ").strip(), _unit_of(name), estimate)
         for effect, parameters in effects.items()
         for name, estimate in parameters.items()
     )
@@ -97,6 +97,11 @@ def offset_in_degrees(offset: Estimate) -> Estimate:
         nominal=None if offset.nominal is None else wrapped_deg(offset.nominal),
         prior_sigma=None if offset.prior_sigma is None else math.degrees(offset.prior_sigma),
     )
+
+
+def _without_unit(name: str) -> str:
+    unit = _unit_of(name)
+    return "" if name == unit else name.removesuffix(f"_{unit}")
 
 
 def _unit_of(name: str) -> str:
