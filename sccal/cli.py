@@ -113,7 +113,7 @@ def calibrate(
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
     )
     batch = calibrate_paths(paths, out, options, _tell)
-    width = min(max(shutil.get_terminal_size((100, 24)).columns, 60), 120)
+    width = _width()
     for vehicle, file in batch.vehicles:
         print()
         print(vehicle_text(vehicle, width) if len(vehicle.runs) > 1 else run_text(vehicle.runs[0], width), end="")
@@ -128,6 +128,11 @@ def calibrate(
         if total > 1:
             print(f"sccal: {len(batch.failures)} of {total} gave no result", file=sys.stderr)
         raise typer.Exit(int(max(failure.error.exit_code for failure in batch.failures)))
+
+
+def _width() -> int:
+    """Columns to print in: the terminal's, within what tables need and eyes can follow."""
+    return min(max(shutil.get_terminal_size((100, 24)).columns, 60), 120)
 
 
 def _tell(source: RunSource, result: Calibration | SccalError) -> None:
@@ -190,8 +195,7 @@ def effects(
     from sccal.effects.catalogue import CATALOGUE, effect_named
     from sccal.report.effects import effect_text, effects_text
 
-    width = min(max(shutil.get_terminal_size((100, 24)).columns, 60), 120)
-    print(effect_text(effect_named(name), width) if name else effects_text(CATALOGUE.values(), width), end="")
+    print(effect_text(effect_named(name), _width()) if name else effects_text(CATALOGUE.values(), _width()), end="")
 
 
 if __name__ == "__main__":

@@ -48,10 +48,6 @@ class Slope:
     def opposed(self) -> bool:
         return self.clear and self.value < 0
 
-    @property
-    def agreed(self) -> bool:
-        return self.clear and self.value > 0
-
 
 def slope_through_origin(x: Floats, y: Floats) -> Slope:
     """Slope of y on x; correlation 0 where either does not vary."""

@@ -84,7 +84,7 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         for k, problem in enumerate(problems):
             theta = own[k].copy()
             theta[shared] = at
-            place = At(Constants(*(float(v) for v in theta[:3])), theta[3:], paths[k])
+            place = At(Constants.of(theta), theta[3:], paths[k])
             likelihoods.append(RunLikelihood.of(problem, place, shared))
             paths[k] = likelihoods[-1].path if problem.extra else None
         precision = prior + sum(one.precision for one in likelihoods)

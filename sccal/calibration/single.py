@@ -58,7 +58,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     honest = forward.finish()
 
     learnt = reported_values(honest)
-    values, final = iterate(problem, At(Constants.of(honest.final_state), learnt[4:], honest))
+    values, final = iterate(problem, At(Constants.of(learnt), learnt[4:], honest))
     covariance = reported_covariance(final)
     if options.filter.with_offset:
         covariance[3, 3] += _variance_of_the_level(problem)

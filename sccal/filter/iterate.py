@@ -136,7 +136,7 @@ def iterate(problem: RunProblem, first: At, max_rounds: int = MAX_ROUNDS) -> tup
     path = first.path
     clear, ratio = None, np.inf
     for _ in range(max_rounds):
-        at = At(Constants(*(float(v) for v in theta[:3])), theta[3:], path)
+        at = At(Constants.of(theta), theta[3:], path)
         if clear is None or abs(theta[0] / theta[1] - ratio) > SAME_RATIO:
             clear, ratio = problem.clear_steps(at.constants), float(theta[0] / theta[1])
         found = problem.begun(at, True, clear).finish()

@@ -100,6 +100,20 @@ def step_of(x: Floats, right: float, left: float, row: int, columns: Columns) ->
 
 
 @compiled
+def shares_of(port: int, c: float, inv_track: float) -> tuple[float, float, float]:
+    """Derivatives of s, Δθ and d by a parameter whose column value is c."""
+    if port == PORT_ALONG:
+        return c, 0.0, 0.0
+    if port == PORT_SIDE:
+        return 0.0, 0.0, c
+    if port == PORT_TURN:
+        return 0.0, c, 0.0
+    if port == PORT_RIGHT_WHEEL:
+        return 0.5 * c, c * inv_track, 0.0
+    return 0.5 * c, -c * inv_track, 0.0
+
+
+@compiled
 def move(
     x: Floats,
     P: Floats,
@@ -128,19 +142,10 @@ def move(
     for k in range(km):
         c = columns.motion[row, k]
         j = BASE_STATES + columns.motion_param[k]
-        port = columns.motion_port[k]
-        if port == PORT_ALONG:
-            gs[j] += c
-        elif port == PORT_SIDE:
-            gd[j] += c
-        elif port == PORT_TURN:
-            gt[j] += c
-        elif port == PORT_RIGHT_WHEEL:
-            gs[j] += 0.5 * c
-            gt[j] += c * inv_track
-        else:
-            gs[j] += 0.5 * c
-            gt[j] -= c * inv_track
+        along, turn, across = shares_of(columns.motion_port[k], c, inv_track)
+        gs[j] += along
+        gt[j] += turn
+        gd[j] += across
 
     middle = x[2] + 0.5 * dtheta
     cm = math.cos(middle)

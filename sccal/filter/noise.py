@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, minimize
 
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
@@ -151,7 +151,7 @@ class _Likelihood:
         """Cost at given noise with the constants fitted to it, and these."""
         problem = self.problem(timeline, logs)
         mode, found = iterate(problem, at, max_rounds=2)
-        fitted = At(Constants(*(float(v) for v in mode[:3])), mode[4:], found if problem.extra else None)
+        fitted = At(Constants.of(mode), mode[4:], found if problem.extra else None)
         candidates = (at, fitted)
         costs = [self.cost(problem, logs, one, problem.clear_steps(one.constants)) for one in candidates]
         better = int(np.argmin(costs))
@@ -159,62 +159,56 @@ class _Likelihood:
 
     def best_of(self, timeline: Timeline, points: list[Floats], at: At) -> list[Floats]:
         """The points in order of their cost at the given constants."""
-        cost = self._cost_of_free(timeline, points[0], at)
-        return sorted(points, key=lambda point: cost(point[self.free]))
+        cost = self._cost_at(timeline, points[0], at)
+        return sorted(points, key=cost)
 
     def climb(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
         """The most likely levels from a far starting point, the constants' linearisation fixed (Powell)."""
-        cost = self._cost_of_free(timeline, logs, at)
+        whole = self._cost_at(timeline, logs, at)
         start = logs[self.free]
         # Its line searches look at the whole range between the bounds, which far away holds other hills.
-        limits = [
-            (max(low, here - REACH), min(high, here + REACH))
-            for (low, high), here in zip(self._limits(), start, strict=True)
-        ]
+        near = Bounds(np.maximum(self.low[self.free], start - REACH), np.minimum(self.high[self.free], start + REACH))
+
+        def cost(part: Floats) -> float:
+            return whole(_with(logs, self.free, part))
+
         options = {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4}
-        found = minimize(cost, start, method="Powell", bounds=limits, options=options)
-        return self._with_free(logs, found.x) if found.fun < cost(start) else logs
+        found = minimize(cost, start, method="Powell", bounds=near, options=options)
+        return _with(logs, self.free, found.x) if found.fun < cost(start) else logs
 
     def climb_smoothly(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
         """The fast levels from a near point (L-BFGS-B). The kernel frees the GIL, so differences share the cores."""
         fast = np.isin(np.arange(logs.size), FAST)
-
-        def with_fast(part: Floats) -> Floats:
-            level = logs.copy()
-            level[fast] = part
-            return level
-
-        whole = self._cost_of_free(timeline, logs, at)
+        whole = self._cost_at(timeline, logs, at)
         with ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, 4)) as pool:
 
             def cost_and_slope(part: Floats) -> tuple[float, Floats]:
                 points = [part, *(part + DIFFERENCE * unit for unit in np.eye(part.size))]
-                here, *beside = pool.map(lambda point: whole(with_fast(point)[self.free]), points)
+                here, *beside = pool.map(lambda point: whole(_with(logs, fast, point)), points)
                 return here, (np.array(beside) - here) / DIFFERENCE
 
             options = {"maxiter": 5, "maxls": 5, "ftol": 1e-6}
-            limits = list(zip(self.low[fast], self.high[fast], strict=True))
+            limits = Bounds(self.low[fast], self.high[fast])
             found = minimize(cost_and_slope, logs[fast], jac=True, method="L-BFGS-B", bounds=limits, options=options)
-        return with_fast(found.x)
+        return _with(logs, fast, found.x)
 
-    def _cost_of_free(self, timeline: Timeline, logs: Floats, at: At) -> Callable[[Floats], float]:
+    def _cost_at(self, timeline: Timeline, logs: Floats, at: At) -> Callable[[Floats], float]:
+        """Cost of any levels, the linearisation and all that depends on it computed once."""
         problem = self.problem(timeline, logs)
         clear = problem.clear_steps(at.constants)
         columns = problem.columns(at)
 
-        def cost(part: Floats) -> float:
-            level = self._with_free(logs, part)
+        def cost(level: Floats) -> float:
             return self.cost(self.problem(timeline, level), level, at, clear, columns)
 
         return cost
 
-    def _with_free(self, logs: Floats, part: Floats) -> Floats:
-        at = logs.copy()
-        at[self.free] = part
-        return at
 
-    def _limits(self) -> list[tuple[float, float]]:
-        return list(zip(self.low[self.free], self.high[self.free], strict=True))
+def _with(logs: Floats, chosen: Bools, part: Floats) -> Floats:
+    """The levels with the chosen ones replaced."""
+    level = logs.copy()
+    level[chosen] = part
+    return level
 
 
 def _white_level_m(aligned: Aligned, start: Start, rows: Bools) -> float:

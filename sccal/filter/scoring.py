@@ -19,15 +19,11 @@ import numpy as np
 
 from sccal.arrays import Floats, Ints, Rows
 from sccal.compiled import compiled
-from sccal.filter.kernel import clamp, decay, downdate, expect_fix, expect_heading, fix_row, move, step_of
+from sccal.filter.kernel import clamp, decay, downdate, expect_fix, expect_heading, fix_row, move, shares_of, step_of
 from sccal.filter.layout import (
     BASE_STATES,
     MEM_FIX_T,
     MEM_HEADING_T,
-    PORT_ALONG,
-    PORT_RIGHT_WHEEL,
-    PORT_SIDE,
-    PORT_TURN,
     Columns,
     Events,
     Model,
@@ -85,14 +81,14 @@ def _carry(
     for k in range(columns.motion_port.shape[0]):
         c = columns.motion[row, k]
         j = BASE_STATES + columns.motion_param[k]
-        along, turn, across = _shares(columns.motion_port[k], c, inv_track)
+        along, turn, across = shares_of(columns.motion_port[k], c, inv_track)
         for q in range(n_candidates):
             ds[q] += along * S[j, q]
             dt[q] += turn * S[j, q]
             dd[q] += across * S[j, q]
     for k in range(candidates.motion_port.shape[0]):
         q = candidates.motion_param[k]
-        along, turn, across = _shares(candidates.motion_port[k], candidates.motion[row, k], inv_track)
+        along, turn, across = shares_of(candidates.motion_port[k], candidates.motion[row, k], inv_track)
         ds[q] += along
         dt[q] += turn
         dd[q] += across
@@ -100,20 +96,6 @@ def _carry(
         S[0, q] += ax * S[2, q] + cm * ds[q] - sm * dd[q] + 0.5 * ax * dt[q]
         S[1, q] += ay * S[2, q] + sm * ds[q] + cm * dd[q] + 0.5 * ay * dt[q]
         S[2, q] += dt[q]
-
-
-@compiled
-def _shares(port: int, c: float, inv_track: float) -> tuple[float, float, float]:
-    """Derivatives of s, Δθ and d by a parameter whose column value is c."""
-    if port == PORT_ALONG:
-        return c, 0.0, 0.0
-    if port == PORT_SIDE:
-        return 0.0, 0.0, c
-    if port == PORT_TURN:
-        return 0.0, c, 0.0
-    if port == PORT_RIGHT_WHEEL:
-        return 0.5 * c, c * inv_track, 0.0
-    return 0.5 * c, -c * inv_track, 0.0
 
 
 @compiled

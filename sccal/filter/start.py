@@ -48,9 +48,9 @@ class Constants:
         return cls(vehicle.wheel_radius_m, vehicle.wheel_radius_m, vehicle.track_m)
 
     @classmethod
-    def of(cls, state: Floats) -> Constants:
-        """From a kernel state (n,)."""
-        return cls(float(state[3]), float(state[4]), float(state[5]))
+    def of(cls, values: Floats) -> Constants:
+        """From R_r, R_l, L, whatever follows them."""
+        return cls(float(values[0]), float(values[1]), float(values[2]))
 
     def as_array(self) -> Floats:
         return np.array([self.radius_right_m, self.radius_left_m, self.track_m])
