@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +24,14 @@ from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 
 MIN_MEASUREMENTS = 10
+
+
+@dataclass(frozen=True)
+class Series:
+    """A further column of the log: its finite values (k,) in the log's unit, and their times on the logging clock."""
+
+    t_s: Floats
+    values: Floats
 
 
 @dataclass(frozen=True)
@@ -55,6 +64,8 @@ class Aligned:
     fix_leading: Bools
     """Fixes of the quality that carries most of the information: the ones that outages are judged by."""
     notices: tuple[Notice, ...]
+    extras: Mapping[str, Series] = field(default_factory=dict)
+    """The log's further columns by name; where two files share a name, the later one's carries its file's."""
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -159,9 +170,25 @@ def align(run: Run) -> Aligned:
         fix_cov_m2=cov,
         fix_leading=_leading(quality, var_east + var_north),
         notices=tuple(notices),
+        extras=_further_columns(
+            ("encoder", wheels.t_s, wheels.extras),
+            ("ahrs", heading.t_s, heading.extras),
+            ("gnss", t_s[good_index], {name: values[good_index] for name, values in fixes.extras.items()}),
+        ),
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
+
+
+def _further_columns(*streams: tuple[str, Floats, Mapping[str, Floats]]) -> dict[str, Series]:
+    """All streams' further columns that vary at all."""
+    found: dict[str, Series] = {}
+    for source, t_s, extras in streams:
+        for name, values in extras.items():
+            finite = np.isfinite(values) & np.isfinite(t_s)
+            if finite.sum() >= MIN_MEASUREMENTS and np.ptp(values[finite]) > 0.0:
+                found[f"{source}.{name}" if name in found else name] = Series(t_s[finite], values[finite])
+    return found
 
 
 def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStream:

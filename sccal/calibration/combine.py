@@ -1,66 +1,22 @@
-"""Several runs of one vehicle as one problem: shared radii and track, own poses, own heading offsets.
-
-Each run's pass leaves the posterior of (R_r, R_l, L) with its own pose and offset marginalised; prior taken out, that
-is the run's likelihood: precision Λ_i and vector η_i. Runs are independent given the shared constants, so the joint
-posterior is Λ = Λ_0 + Σ Λ_i, η = Λ_0 m_0 + Σ η_i, the prior counted once. All runs are linearised again at the joint
-answer until it stays.
-
-Where runs disagree by more than their sigmas allow, something that the model lacks differs between them. The sigmas
-then come from the runs' own scores u_i = η_i − Λ_i m (Liang and Zeger 1986, runs as clusters), if those are larger.
-"""
+"""Several runs of one vehicle as one result: the joint fit, its judgement, and everything pooled over the runs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeGuard
 
 import numpy as np
 
 from sccal.arrays import Floats, Ints
-from sccal.calibration.extension import FreeEffects
+from sccal.calibration.joint import fit_jointly, is_free, shared_places
 from sccal.calibration.outage import summarise
 from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 from sccal.calibration.status import judge
-from sccal.filter.forward import ForwardPass, numeric_limits
-from sccal.filter.iterate import At, RunProblem, reported_covariance, reported_values
+from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
 from sccal.logs.streams import Notice
 
-MAX_ROUNDS = 4
-CLOSE_SIGMAS = 0.05
 INCONSISTENT = 3.0
 OFFSET_OF_THE_RUN_RAD = np.radians(5.0)
-
-
-@dataclass(frozen=True)
-class RunLikelihood:
-    """What one run says of the shared parameters, its own ones marginalised, no prior of the shared ones in it."""
-
-    precision: Floats
-    """(k, k)"""
-    vector: Floats
-    """(k,) precision times the run's own best values."""
-    path: ForwardPass
-
-    @classmethod
-    def of(cls, problem: RunProblem, at: At, shared: Ints) -> RunLikelihood:
-        """From a pass linearised there; shared are the places among R_r, R_l, L and the effects' parameters."""
-        found = problem.begun(at, True).finish()
-        theta = np.concatenate((at.constants.as_array(), at.values))
-        learnt = np.r_[0:3, 4 : 4 + problem.extra]
-        values = reported_values(found)[learnt]
-        covariance = reported_covariance(found)[np.ix_(learnt, learnt)]
-        # The run's own parameters keep their prior about zero: to first order, as in iterate.
-        own = np.setdiff1d(np.arange(theta.size), shared)
-        weight = np.zeros((theta.size, theta.size))
-        weight[np.ix_(own, own)] = np.linalg.inv(problem.prior)[np.ix_(own, own)]
-        values = values + covariance @ weight @ (problem.prior_mean - theta)
-        posterior = np.linalg.inv(covariance[np.ix_(shared, shared)])
-        prior = np.linalg.inv(problem.prior[np.ix_(shared, shared)])
-        precision = posterior - prior
-        vector = posterior @ values[shared] - prior @ theta[shared]
-        return cls(0.5 * (precision + precision.T), vector, found)
 
 
 def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> VehicleCalibration:
@@ -72,31 +28,10 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         return VehicleCalibration(
             vehicle, only.with_offset, (only,), only.parameters, only.fit, only.outage, None, effects=only.effects
         )
-    shared = _shared(first)
-    prior = np.asarray(np.linalg.inv(first.prior[np.ix_(shared, shared)]), dtype=np.float64)
-    centre = np.median([problem.prior_mean[shared] for problem in problems], axis=0)
-    lower, upper = numeric_limits(first.centre)
-    at = _rough_mean(runs, first)[shared]
+    shared = shared_places(first)
     own = [_own_values(run, problem) for run, problem in zip(runs, problems, strict=True)]
-    paths: list[ForwardPass | None] = [None] * len(problems)
-    for _ in range(MAX_ROUNDS):
-        likelihoods = []
-        for k, problem in enumerate(problems):
-            theta = own[k].copy()
-            theta[shared] = at
-            place = At(Constants.of(theta), theta[3:], paths[k])
-            likelihoods.append(RunLikelihood.of(problem, place, shared))
-            paths[k] = likelihoods[-1].path if problem.extra else None
-        precision = prior + sum(one.precision for one in likelihoods)
-        covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-        mode = covariance @ (prior @ centre + sum(one.vector for one in likelihoods))
-        mode[:3] = np.clip(mode[:3], lower, upper)
-        moved = np.abs(mode - at) / np.sqrt(np.diag(covariance))
-        at = mode
-        if moved.max() < CLOSE_SIGMAS:
-            break
-    chi2_per_dof = _consistency(likelihoods, at, prior)
-    covariance = _at_least(covariance, _between_runs(likelihoods, at, covariance))
+    fit = fit_jointly(problems, [At(Constants.of(theta), theta[3:]) for theta in own])
+    at, covariance, chi2_per_dof = fit.mode, fit.robust, fit.chi2_per_dof
     offset, notices = _combined_offset(runs)
     full = np.zeros((4, 4))
     full[:3, :3] = covariance[:3, :3]
@@ -126,21 +61,11 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
     )
 
 
-def _shared(problem: RunProblem) -> Ints:
-    """Places of the shared ones among R_r, R_l, L and the effects' parameters."""
-    scopes = [one.scope for _, one in problem.extension.parameters] if _is_free(problem.extension) else []
-    return np.array([0, 1, 2, *(3 + k for k, scope in enumerate(scopes) if scope == "vehicle")], dtype=np.int64)
-
-
-def _is_free(extension: object) -> TypeGuard[FreeEffects]:
-    return isinstance(extension, FreeEffects)
-
-
 def _shared_effects(
     problem: RunProblem, shared: Ints, values: Floats, covariance: Floats
 ) -> dict[str, dict[str, Estimate]]:
     """The vehicle's share of the effects; what belongs to runs stands in the runs' own results."""
-    if not _is_free(problem.extension):
+    if not is_free(problem.extension):
         return {}
     count = problem.extra
     whole, spread = np.zeros(count), np.zeros((count, count))
@@ -159,7 +84,7 @@ def _shared_effects(
 def _own_values(run: Calibration, problem: RunProblem) -> Floats:
     """The run's own estimates of R_r, R_l, L and the effects' parameters (3 + m,)."""
     p = run.parameters
-    effects = problem.extension.parameters if _is_free(problem.extension) else ()
+    effects = problem.extension.parameters if is_free(problem.extension) else ()
     return np.array(
         [
             p.radius_right_m.value,
@@ -168,39 +93,6 @@ def _own_values(run: Calibration, problem: RunProblem) -> Floats:
             *(run.effects[effect.name][one.name].value for effect, one in effects),
         ]
     )
-
-
-def _rough_mean(runs: Sequence[Calibration], problem: RunProblem) -> Floats:
-    """Median over the runs: good enough to linearise at."""
-    return np.asarray(np.median([_own_values(run, problem) for run in runs], axis=0))
-
-
-def _consistency(likelihoods: Sequence[RunLikelihood], at: Floats, prior: Floats) -> float | None:
-    """χ² of the runs' own answers around the joint one, per degree of freedom, over the directions they observe."""
-    chi2, directions = 0.0, 0
-    scale = np.sqrt(np.diag(prior))
-    for one in likelihoods:
-        score = (one.vector - one.precision @ at) / scale
-        values, vectors = np.linalg.eigh(one.precision / np.outer(scale, scale))
-        seen = values > 1.0
-        chi2 += float(((vectors.T @ score)[seen] ** 2 / values[seen]).sum())
-        directions += int(seen.sum())
-    dof = directions - at.size
-    return chi2 / dof if dof > 0 else None
-
-
-def _between_runs(likelihoods: Sequence[RunLikelihood], at: Floats, covariance: Floats) -> Floats:
-    """Covariance from the scatter of the runs' scores."""
-    scores = np.array([one.vector - one.precision @ at for one in likelihoods])
-    count = len(likelihoods)
-    return np.asarray(covariance @ (scores.T @ scores) @ covariance * (count / (count - 1.0)))
-
-
-def _at_least(covariance: Floats, other: Floats) -> Floats:
-    """The covariance with every sigma raised to the other's where that is larger, correlations kept."""
-    sigma = np.sqrt(np.diag(covariance))
-    raised = np.maximum(sigma, np.sqrt(np.maximum(np.diag(other), 0.0))) / sigma
-    return np.asarray(covariance * np.outer(raised, raised))
 
 
 def _combined_offset(runs: Sequence[Calibration]) -> tuple[Estimate, list[Notice]]:

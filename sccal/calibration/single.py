@@ -39,7 +39,7 @@ def prepare(aligned: Aligned, options: CalibrationOptions) -> RunProblem:
     """Find the start and the noise of one aligned run. Raises DataError where that is impossible."""
     start = find_start(aligned)
     noise = options.noise
-    extension = FreeEffects.named(options.effects)
+    extension = FreeEffects.named(options.effects, aligned)
     if noise is None:
         noise = estimate_noise(aligned, start, options.filter, options.heading_rate_hz, extension)
     timeline = build_timeline(aligned, options.output_rate_hz, options.heading_rate_hz)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sccal.align import Aligned, Timeline
+from sccal.align import Aligned, Series, Timeline
 from sccal.arrays import Floats
 
 SMOOTH_S = 0.3
@@ -62,11 +62,14 @@ class DriveView:
     steps: Steps
     headings: Moments
     fixes: Moments
-    step_columns: Mapping[str, Floats] = field(default_factory=dict)
-    """The log's further columns, interpolated to the motion events."""
-    heading_columns: Mapping[str, Floats] = field(default_factory=dict)
-    """The same at the heading readings."""
+    logged: Mapping[str, Series] = field(default_factory=dict)
+    """The log's further columns."""
     has_tilt: bool = False
+
+    def logged_at(self, name: str, t_s: Floats) -> Floats:
+        """A further column interpolated to some times; zeros where this log has no such column."""
+        series = self.logged.get(name)
+        return np.zeros(t_s.size) if series is None else np.interp(t_s, series.t_s, series.values)
 
 
 @dataclass(frozen=True)
@@ -83,8 +86,14 @@ class Belief:
     north_m: Floats
 
 
-def view_drive(aligned: Aligned, timeline: Timeline, belief: Belief) -> DriveView:
-    """The drive at the timeline's events and measurements."""
+def view_drive(
+    aligned: Aligned, timeline: Timeline, belief: Belief, clear: tuple[Floats, Floats] | None = None
+) -> DriveView:
+    """The drive at the timeline's events and measurements.
+
+    ``clear`` are the wheels' steps freed of slip, right and left (n,) rad, as from sccal.align.clear_steps: a column
+    made of steps that hold the noise it is regressed on would come out biased. None: the steps as they are.
+    """
     t = aligned.wheel_t_s
     right = belief.radius_right_m * aligned.right_rad
     left = belief.radius_left_m * aligned.left_rad
@@ -113,7 +122,8 @@ def view_drive(aligned: Aligned, timeline: Timeline, belief: Belief) -> DriveVie
     ends = timeline.t_s
     dt = np.diff(ends, prepend=ends[0])
     middle = ends - 0.5 * dt
-    right_m, left_m = belief.radius_right_m * timeline.right_rad, belief.radius_left_m * timeline.left_rad
+    right_rad, left_rad = (timeline.right_rad, timeline.left_rad) if clear is None else clear
+    right_m, left_m = belief.radius_right_m * right_rad, belief.radius_left_m * left_rad
     pitch, roll = aligned.pitch_rad, aligned.roll_rad
     zeros = np.zeros(ends.size)
     steps = Steps(
@@ -137,5 +147,6 @@ def view_drive(aligned: Aligned, timeline: Timeline, belief: Belief) -> DriveVie
         steps=steps,
         headings=moments(aligned.heading_t_s[timeline.heading_index]),
         fixes=moments(aligned.fix_t_s[timeline.fix_index]),
+        logged=aligned.extras,
         has_tilt=pitch is not None and roll is not None,
     )

@@ -45,8 +45,8 @@ class Extension(Protocol):
         """(m,) about zero."""
         ...
 
-    def columns(self, problem: RunProblem, at: At) -> Columns:
-        """The kernel's columns for the problem's timeline."""
+    def columns(self, problem: RunProblem, at: At, clear: tuple[Floats, Floats]) -> Columns:
+        """The kernel's columns for the problem's timeline; clear as from RunProblem.clear_steps."""
         ...
 
 
@@ -93,9 +93,9 @@ class RunProblem:
         """The wheels' motion freed of slip, given the ratio of the radii."""
         return clear_steps(self.aligned, self.timeline, constants.radius_right_m / constants.radius_left_m)
 
-    def columns(self, at: At) -> Columns:
+    def columns(self, at: At, clear: tuple[Floats, Floats]) -> Columns:
         """The extension's columns, or none."""
-        return kernel_columns((), self.timeline) if self.extension is None else self.extension.columns(self, at)
+        return kernel_columns((), self.timeline) if self.extension is None else self.extension.columns(self, at, clear)
 
     def begun(
         self,
@@ -108,15 +108,16 @@ class RunProblem:
 
         ``clear`` and ``columns`` spare their computation where they are known already.
         """
+        clear = self.clear_steps(at.constants) if clear is None else clear
         run = Filter(
             self.aligned,
             self.timeline,
             self.noise,
             self.options,
             self.centre,
-            self.clear_steps(at.constants) if clear is None else clear,
+            clear,
             at.constants if linearise_there else None,
-            self.columns(at) if columns is None else columns,
+            self.columns(at, clear) if columns is None else columns,
             self.extra,
         )
         run.begin(self.start, at.constants, self.prior, at.values)

@@ -196,7 +196,7 @@ class _Likelihood:
         """Cost of any levels, the linearisation and all that depends on it computed once."""
         problem = self.problem(timeline, logs)
         clear = problem.clear_steps(at.constants)
-        columns = problem.columns(at)
+        columns = problem.columns(at, clear)
 
         def cost(level: Floats) -> float:
             return self.cost(self.problem(timeline, level), level, at, clear, columns)
