@@ -23,8 +23,8 @@ class BaseShift(Effect):
     name = "base_shift"
     title = "fixes that jump once: another base, or the base surveyed anew"
     parameters = (
-        Parameter("east_m", "m", 1.0, -100.0, 100.0, "run"),
-        Parameter("north_m", "m", 1.0, -100.0, 100.0, "run"),
+        Parameter("east_m", "m", 1.0, -100.0, 100.0, "run", matters=0.08),
+        Parameter("north_m", "m", 1.0, -100.0, 100.0, "run", matters=0.08),
         Parameter("at_s", "s", 1000.0, 0.0, 1e6, "run", shape=True),
     )
     looks_like = "from one moment on all fixes stand beside the path by the same distance in the same direction"

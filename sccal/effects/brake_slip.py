@@ -22,7 +22,7 @@ class BrakeSlip(Effect):
 
     name = "brake_slip"
     title = "slip while braking"
-    parameters = (Parameter("per_mps2", "s²/m", 0.05, -0.5, 0.5),)
+    parameters = (Parameter("per_mps2", "s²/m", 0.05, -0.5, 0.5, matters=0.01),)
     looks_like = "each stop ends short of where the wheels say, in proportion to how hard it braked"
     excited_by = "brake hard as well as gently, from more than one speed"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"

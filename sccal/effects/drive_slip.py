@@ -22,7 +22,7 @@ class DriveSlip(Effect):
 
     name = "drive_slip"
     title = "slip while speeding up"
-    parameters = (Parameter("per_mps2", "s²/m", 0.05, -0.5, 0.5),)
+    parameters = (Parameter("per_mps2", "s²/m", 0.05, -0.5, 0.5, matters=0.01),)
     looks_like = "each start falls short of what the wheels say, in proportion to how hard it speeds up"
     excited_by = "speed up hard as well as gently, to more than one speed"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"

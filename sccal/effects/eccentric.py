@@ -22,8 +22,8 @@ _EXCITED_BY = (
 )
 _REFERENCE = "geometry of a circle turning about a point off its middle"
 _PARAMETERS = (
-    Parameter("cos", "1", 0.01, -0.3, 0.3, scope="run"),
-    Parameter("sin", "1", 0.01, -0.3, 0.3, scope="run"),
+    Parameter("cos", "1", 0.01, -0.3, 0.3, scope="run", matters=0.002),
+    Parameter("sin", "1", 0.01, -0.3, 0.3, scope="run", matters=0.002),
 )
 """Of the run, not the vehicle: each log counts φ from its own first sample."""
 

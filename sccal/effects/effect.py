@@ -36,6 +36,8 @@ class Parameter:
     upper: float
     scope: Scope = "vehicle"
     """Whether all runs of a vehicle share it."""
+    matters: float = 0.0
+    """Smallest size worth telling anybody; smaller ones are taken as always possible."""
     shape: bool = False
     """True for a place, a time or a size that its column depends on nonlinearly: searched for, never filtered."""
 

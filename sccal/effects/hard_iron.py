@@ -42,8 +42,8 @@ class HardIron(Effect):
     name = "hard_iron"
     title = "magnetised parts near the compass"
     parameters = (
-        Parameter("cos_deg", "deg", 10.0, -40.0, 40.0),
-        Parameter("sin_deg", "deg", 10.0, -40.0, 40.0),
+        Parameter("cos_deg", "deg", 10.0, -40.0, 40.0, matters=0.03),
+        Parameter("sin_deg", "deg", 10.0, -40.0, 40.0, matters=0.03),
     )
     looks_like = "the heading error swings once per full turn of the robot: one way going east, the other going west"
     excited_by = "drive in at least eight headings: full circles, or spin in place both ways by whole turns"

@@ -22,7 +22,7 @@ class HeadingDrift(Effect):
 
     name = "heading_drift"
     title = "AHRS heading that drifts with time"
-    parameters = (Parameter("deg_per_hour", "deg/h", 20.0, -1000.0, 1000.0, "run"),)
+    parameters = (Parameter("deg_per_hour", "deg/h", 20.0, -1000.0, 1000.0, "run", matters=4),)
     looks_like = "the heading offset of the first minutes differs from that of the last; in between it moves evenly"
     excited_by = "drive for longer, with straights of 20 m in two directions at the beginning and at the end"
     reference = "Titterton and Weston 2004, Strapdown Inertial Navigation Technology: gyroscope bias"

@@ -23,7 +23,7 @@ class HeadingStep(Effect):
     name = "heading_step"
     title = "AHRS heading that jumps once: a reset, or a knock on the mounting"
     parameters = (
-        Parameter("deg", "deg", 10.0, -180.0, 180.0, "run"),
+        Parameter("deg", "deg", 10.0, -180.0, 180.0, "run", matters=1.5),
         Parameter("at_s", "s", 1000.0, 0.0, 1e6, "run", shape=True),
     )
     looks_like = "the heading offset has one value up to a moment and another one from there on"

@@ -23,8 +23,8 @@ class LeverArm(Effect):
     name = "lever_arm"
     title = "antenna off the middle between the wheels"
     parameters = (
-        Parameter("forward_m", "m", 0.5, -5.0, 5.0),
-        Parameter("left_m", "m", 0.5, -5.0, 5.0),
+        Parameter("forward_m", "m", 0.5, -5.0, 5.0, matters=0.04),
+        Parameter("left_m", "m", 0.5, -5.0, 5.0, matters=0.04),
     )
     looks_like = (
         "fixes circle around the path when the robot turns; wheels and track seem to differ between left and right"

@@ -23,7 +23,7 @@ class LocalField(Effect):
     name = "local_field"
     title = "compass disturbed near one place"
     parameters = (
-        Parameter("deg", "deg", 10.0, -90.0, 90.0, "run"),
+        Parameter("deg", "deg", 10.0, -90.0, 90.0, "run", matters=2),
         Parameter("east_m", "m", 100.0, -10000.0, 10000.0, "run", shape=True),
         Parameter("north_m", "m", 100.0, -10000.0, 10000.0, "run", shape=True),
         Parameter("radius_m", "m", 5.0, 0.2, 100.0, "run", shape=True),

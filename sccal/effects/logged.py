@@ -63,7 +63,9 @@ class LoggedColumn(Effect):
         prior = (HEADING_PRIOR_DEG if where == "heading" else MOTION_PRIOR) / values.spread
         self.name = f"{where}~{column}"
         self.title = f"{column} {does}"
-        self.parameters = (Parameter(parameter, f"{unit}/unit", prior, -REACH * prior, REACH * prior),)
+        self.parameters = (
+            Parameter(parameter, f"{unit}/unit", prior, -REACH * prior, REACH * prior, matters=0.05 * prior),
+        )
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

@@ -18,7 +18,7 @@ _EXCITED_BY = (
     "drive 20 m straight, and measure the wheel's radius by hand: the log alone knows only the product of the two"
 )
 _REFERENCE = "counting: what is counted is 1 − ratio of what is turned"
-_PARAMETERS = (Parameter("ratio", "1", 0.02, -0.5, 0.5),)
+_PARAMETERS = (Parameter("ratio", "1", 0.02, -0.5, 0.5, matters=0.005),)
 
 
 class MissedLeft(Effect):

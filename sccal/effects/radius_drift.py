@@ -24,7 +24,7 @@ class RadiusDrift(Effect):
 
     name = "radius_drift"
     title = "radii that grow during the run: warming tyres, soil that sticks"
-    parameters = (Parameter("per_hour", "1/h", 0.05, -1.0, 1.0, scope="run"),)
+    parameters = (Parameter("per_hour", "1/h", 0.05, -1.0, 1.0, scope="run", matters=0.01),)
     looks_like = "both radii estimated from the first half of the run differ from those of the second half, gradually"
     excited_by = (
         "drive for half an hour or more at the same mix of speeds, repeating one straight at the start and the end"

@@ -23,7 +23,7 @@ class RadiusStep(Effect):
     name = "radius_step"
     title = "radii that change at one moment: a load, mud, a loss of pressure"
     parameters = (
-        Parameter("ratio", "1", 0.02, -0.5, 0.5, scope="run"),
+        Parameter("ratio", "1", 0.02, -0.5, 0.5, scope="run", matters=0.004),
         Parameter("at_s", "s", 600.0, 0.0, 86400.0, scope="run", shape=True),
     )
     looks_like = "both radii jump at one moment and stay there"

@@ -23,7 +23,7 @@ class RollSlip(Effect):
 
     name = "roll_slip"
     title = "sliding downhill while driving across a slope"
-    parameters = (Parameter("ratio", "1", 0.1, -2.0, 2.0),)
+    parameters = (Parameter("ratio", "1", 0.1, -2.0, 2.0, matters=0.02),)
     looks_like = "the path drifts to the low side on slopes, whichever way they are crossed; fixes pull it back uphill"
     excited_by = "drive across a slope of 5° or more in both directions, with an AHRS that logs roll"
     reference = "statics of a wheel that creeps under a side load; slope slip of tracked vehicles"

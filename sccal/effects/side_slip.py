@@ -19,7 +19,7 @@ class SideSlip(Effect):
 
     name = "side_slip"
     title = "sliding outwards in turns taken at speed"
-    parameters = (Parameter("s", "s", 0.1, -1.0, 1.0),)
+    parameters = (Parameter("s", "s", 0.1, -1.0, 1.0, matters=0.02),)
     looks_like = (
         "fixes drift to the outside of every arc but not of spins in place; like a forward lever arm at one speed"
     )

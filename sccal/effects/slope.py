@@ -24,7 +24,7 @@ class Slope(Effect):
 
     name = "slope"
     title = "level distance shorter than the travelled one on a slope"
-    parameters = (Parameter("ratio", "1", 1.0, -10.0, 10.0),)
+    parameters = (Parameter("ratio", "1", 1.0, -10.0, 10.0, matters=0.2),)
     looks_like = "both radii seem smaller on steep stretches, uphill and downhill alike"
     excited_by = "drive up and down a slope of 5° or more, and on level ground, with an AHRS that logs pitch"
     reference = "geometry: the level part of a slanted way is its cosine"

@@ -33,8 +33,8 @@ class SoftIron(Effect):
     name = "soft_iron"
     title = "iron near the compass that bends the earth's field"
     parameters = (
-        Parameter("cos2_deg", "deg", 5.0, -30.0, 30.0),
-        Parameter("sin2_deg", "deg", 5.0, -30.0, 30.0),
+        Parameter("cos2_deg", "deg", 5.0, -30.0, 30.0, matters=0.03),
+        Parameter("sin2_deg", "deg", 5.0, -30.0, 30.0, matters=0.03),
     )
     looks_like = "the heading error swings twice per full turn of the robot and is the same going there and back"
     excited_by = "drive in at least eight headings: full circles, or spin in place both ways by whole turns"

@@ -22,7 +22,7 @@ class SpeedField(Effect):
 
     name = "speed_field"
     title = "compass turned by the motors' field, in proportion to speed"
-    parameters = (Parameter("deg_per_mps", "deg/(m/s)", 5.0, -60.0, 60.0),)
+    parameters = (Parameter("deg_per_mps", "deg/(m/s)", 5.0, -60.0, 60.0, matters=0.3),)
     looks_like = "the heading offset changes when the robot stops, drives at another speed or reverses"
     excited_by = "drive at a second speed, stop now and then, and reverse 10 m"
     reference = "Ozyagcilar, NXP AN4247, Layout recommendations for PCBs using a magnetometer: fields of currents"

@@ -22,7 +22,7 @@ class SpeedSlip(Effect):
 
     name = "speed_slip"
     title = "wheels that slip more at higher speed"
-    parameters = (Parameter("per_mps", "s/m", 0.03, -0.2, 0.2),)
+    parameters = (Parameter("per_mps", "s/m", 0.03, -0.2, 0.2, matters=0.005),)
     looks_like = "both radii seem smaller on fast stretches than on slow ones"
     excited_by = "drive at a second speed: the same kind of straight, slow and fast"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"

@@ -22,7 +22,7 @@ class TurnScrub(Effect):
 
     name = "turn_scrub"
     title = "tracks that scrub in turns and hold the body back"
-    parameters = (Parameter("per_radps", "s/rad", 0.1, -1.0, 1.0),)
+    parameters = (Parameter("per_radps", "s/rad", 0.1, -1.0, 1.0, matters=0.02),)
     looks_like = (
         "arcs come out shorter than the wheels say, while straights fit; the radii seem smaller on curved drives"
     )

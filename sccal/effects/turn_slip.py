@@ -22,7 +22,7 @@ class TurnSlip(Effect):
 
     name = "turn_slip"
     title = "tracks that skid sideways in turns, more in fast ones"
-    parameters = (Parameter("per_radps", "s/rad", 0.1, -1.0, 1.0),)
+    parameters = (Parameter("per_radps", "s/rad", 0.1, -1.0, 1.0, matters=0.03),)
     looks_like = "the track seems wider in fast turns than in slow ones; the heading jumps back after each turn"
     excited_by = "turn at two clearly different rates, both ways: slow arcs and fast spins in place"
     reference = "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014, on skid-steered turning"

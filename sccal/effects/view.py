@@ -66,6 +66,23 @@ class DriveView:
     """The log's further columns."""
     has_tilt: bool = False
 
+    @property
+    def step_yaw_rad(self) -> Floats:
+        """Heading at the motion events (n,)."""
+        return self._at_steps(self.headings.yaw_rad)
+
+    @property
+    def step_place_m(self) -> tuple[Floats, Floats]:
+        """East and north at the motion events, (n,) each."""
+        return self._at_steps(self.headings.east_m), self._at_steps(self.headings.north_m)
+
+    def at_fixes(self, of_steps: Floats) -> Floats:
+        """A quantity of the motion events (n,) at the fixes."""
+        return np.interp(self.fixes.t_s, self.steps.t_s, of_steps)
+
+    def _at_steps(self, of_headings: Floats) -> Floats:
+        return np.interp(self.steps.t_s, self.headings.t_s, of_headings)
+
     def logged_at(self, name: str, t_s: Floats) -> Floats:
         """A further column interpolated to some times; zeros where this log has no such column."""
         series = self.logged.get(name)
@@ -92,11 +109,16 @@ def view_drive(
     """The drive at the timeline's events and measurements.
 
     ``clear`` are the wheels' steps freed of slip, right and left (n,) rad, as from sccal.align.clear_steps: a column
-    made of steps that hold the noise it is regressed on would come out biased. None: the steps as they are.
+    made of steps or rates that hold the noise it is regressed on would come out biased. None: the steps as they are.
     """
-    t = aligned.wheel_t_s
-    right = belief.radius_right_m * aligned.right_rad
-    left = belief.radius_left_m * aligned.left_rad
+    right_rad, left_rad = (timeline.right_rad, timeline.left_rad) if clear is None else clear
+    right_m, left_m = belief.radius_right_m * right_rad, belief.radius_left_m * left_rad
+    if clear is None:
+        t = aligned.wheel_t_s
+        right, left = belief.radius_right_m * aligned.right_rad, belief.radius_left_m * aligned.left_rad
+    else:
+        t = timeline.t_s
+        right, left = np.cumsum(right_m), np.cumsum(left_m)
     along, turn = 0.5 * (right + left), (right - left) / belief.track_m
     half = 0.5 * SMOOTH_S
 
@@ -122,8 +144,6 @@ def view_drive(
     ends = timeline.t_s
     dt = np.diff(ends, prepend=ends[0])
     middle = ends - 0.5 * dt
-    right_rad, left_rad = (timeline.right_rad, timeline.left_rad) if clear is None else clear
-    right_m, left_m = belief.radius_right_m * right_rad, belief.radius_left_m * left_rad
     pitch, roll = aligned.pitch_rad, aligned.roll_rad
     zeros = np.zeros(ends.size)
     steps = Steps(
@@ -136,8 +156,8 @@ def view_drive(
         speed_mps=rate(along, middle),
         turn_rate_radps=rate(turn, middle),
         acceleration_mps2=acceleration(middle),
-        right_angle_rad=np.interp(middle, t, aligned.right_rad),
-        left_angle_rad=np.interp(middle, t, aligned.left_rad),
+        right_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.right_rad),
+        left_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.left_rad),
         pitch_rad=zeros if pitch is None else np.interp(middle, aligned.heading_t_s, pitch),
         roll_rad=zeros if roll is None else np.interp(middle, aligned.heading_t_s, roll),
     )

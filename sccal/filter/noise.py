@@ -71,8 +71,11 @@ def estimate_noise(
     options: FilterOptions,
     heading_rate_hz: float,
     extension: Extension | None = None,
+    first: At | None = None,
 ) -> Noise:
     """The log's own noise: first rough constants under assumed noise, then the noise given them.
+
+    ``first`` are constants and effects known already, to start from instead.
 
     A coarse search over thinned measurements finds the right hill (a correlated fix error and a slipping wheel can
     both carry the blame); a fine one over all of them then settles what their number changes: white levels and slip.
@@ -85,7 +88,9 @@ def estimate_noise(
     coarse = build_timeline(aligned, 0.01, 2.0, 1.0, stretch, 5.0)
     fine = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
 
-    rough = likelihood.problem(coarse, likelihood.centre).at_centre(coarse_constants(aligned, start))
+    rough = first
+    if rough is None:
+        rough = likelihood.problem(coarse, likelihood.centre).at_centre(coarse_constants(aligned, start))
     promising = likelihood.best_of(coarse, likelihood.hills(), rough)[:SETTLED_HILLS]
     settled = [(likelihood.settled(coarse, hill, rough), hill) for hill in promising]
     (cost, at), level = min(settled, key=lambda one: one[0][0])

@@ -1,0 +1,218 @@
+"""Before and after, on data that fitted neither.
+
+Several runs: each is judged by constants and effects fitted on all the others. One run: each of some stretches of time
+is judged by a fit that saw nothing of it. What belongs to a run that was left out (its clock, its heading offset) the
+filter learns on the way, from the data before each moment, as it would on the robot. The noise levels, seven numbers a
+run, are the run's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sccal.align import Timeline
+from sccal.arrays import Bools, Floats
+from sccal.calibration.joint import fit_jointly, shared_places
+from sccal.calibration.outage import run_with_outages, summarise
+from sccal.calibration.result import OutageWindow
+from sccal.diagnose.model import Model, names_of
+from sccal.filter.forward import ForwardPass
+from sccal.filter.iterate import At, RunProblem
+from sccal.filter.start import Constants
+
+STRETCHES = 4
+MIN_RUNS = 3
+SETTLED_S = 20.0
+ROUNDS = 3
+CLIP = 25.0
+"""A measurement's normalised innovation squared counts no further in the likelihood: outliers judge nothing."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What one model does on data that did not fit it."""
+
+    windows: tuple[OutageWindow, ...]
+    """Stretches without fixes, in the order of runs and times."""
+    window_s: float
+    fix_m2: Floats
+    """Squared innovations of the fixes (f,), east and north together."""
+    heading_rad2: Floats
+    nll: Floats
+    """Negative log-likelihood per scalar measurement, of every measurement."""
+
+    @property
+    def outage_rms_m(self) -> float | None:
+        return summarise(list(self.windows), self.window_s, "").rms_m
+
+    @property
+    def outage_end_rms_m(self) -> float | None:
+        return summarise(list(self.windows), self.window_s, "").end_rms_m
+
+    @property
+    def gnss_innovation_rms_m(self) -> float:
+        return float(np.sqrt(self.fix_m2.mean())) if self.fix_m2.size else float("nan")
+
+    @property
+    def heading_innovation_rms_rad(self) -> float:
+        return float(np.sqrt(self.heading_rad2.mean())) if self.heading_rad2.size else float("nan")
+
+    @property
+    def nll_per_measurement(self) -> float:
+        return float(self.nll.mean()) if self.nll.size else float("nan")
+
+
+def judge(model: Model, window_s: float) -> Judged:
+    """Hold out every run, or every stretch of the only one, in its turn."""
+    if len(model.problems) > 1:
+        parts = [_on_others(model, run, window_s) for run in range(len(model.problems))]
+    else:
+        parts = [_on_a_stretch(model, stretch, window_s) for stretch in stretches(model.problems[0])]
+    return Judged(
+        windows=tuple(window for part in parts for window in part.windows),
+        window_s=window_s,
+        fix_m2=np.concatenate([part.fix_m2 for part in parts]),
+        heading_rad2=np.concatenate([part.heading_rad2 for part in parts]),
+        nll=np.concatenate([part.nll for part in parts]),
+    )
+
+
+def how(model: Model) -> str:
+    """In words, which data judged and which fitted."""
+    runs = len(model.problems)
+    if runs > 1:
+        return (
+            f"each of {runs} runs judged by constants and effects fitted on the {runs - 1} others; its heading offset "
+            "and clock learnt on the way, from data before each moment"
+        )
+    return (
+        f"each of {STRETCHES} stretches of the run judged by a fit that saw neither fixes nor headings of it; position "
+        "and heading offset followed on the way, from data before each moment"
+    )
+
+
+def stretches(problem: RunProblem) -> list[tuple[float, float]]:
+    """Equal parts of the time after settling."""
+    first = max(problem.start.until_s, problem.start.moving_from_s + SETTLED_S)
+    edges = np.linspace(min(first, problem.aligned.span_s[1]), problem.aligned.span_s[1], STRETCHES + 1)
+    return [(float(a), float(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def _on_others(model: Model, run: int, window_s: float) -> Judged:
+    others = [k for k in range(len(model.problems)) if k != run]
+    fit = fit_jointly([model.problems[k] for k in others], [model.at(k) for k in others], ROUNDS)
+    problem = model.problems[run]
+    places = shared_places(problem)
+    size = 3 + problem.extra
+    theta = np.concatenate((problem.centre.as_array(), np.zeros(problem.extra)))
+    theta[places] = fit.mode
+    covariance = problem.prior.copy()
+    covariance[places, :] = 0.0
+    covariance[:, places] = 0.0
+    covariance[np.ix_(places, places)] = fit.robust
+    for place in np.setdiff1d(np.arange(size), places):
+        values = _on_runs(model, others, run, place)
+        if values.size:
+            theta[place], variance = _expected(values)
+            covariance[place, place] = min(variance, covariance[place, place])
+    offsets = np.array([model.path(k).final_state[6] for k in others])
+    middle = float(np.angle(np.exp(1j * offsets).sum()))
+    apart, variance = _expected(np.angle(np.exp(1j * (offsets - middle))))
+    return _judged(
+        problem, theta, covariance, problem.aligned.span_s, window_s, model.path(run), (middle + apart, variance)
+    )
+
+
+def _on_runs(model: Model, others: Sequence[int], run: int, place: int) -> Floats:
+    """What other runs have for a parameter of this run's own, as far as they have it."""
+    wanted = names_of(model.problems[run])[place - 3]
+    return np.array(
+        [
+            float(model.fit.each[k][3 + j])
+            for k in others
+            for j, name in enumerate(names_of(model.problems[k]))
+            if name == wanted
+        ]
+    )
+
+
+def _expected(values: Floats) -> tuple[float, float]:
+    """Mean and variance of one more run's value: the others' scatter, doubled where it rests on few of them."""
+    count = values.size
+    if count < MIN_RUNS:
+        return float(values.mean()), np.inf
+    return float(values.mean()), float(values.var(ddof=1)) * (1.0 + 1.0 / count) * (1.0 + 2.0 / (count - 1))
+
+
+def _on_a_stretch(model: Model, stretch: tuple[float, float], window_s: float) -> Judged:
+    problem = model.problems[0]
+    blind = replace(problem, timeline=without(problem.timeline, stretch))
+    fit = fit_jointly([blind], [model.at(0)], ROUNDS)
+    covariance = fit.runs[0].covariance
+    return _judged(problem, fit.each[0], covariance, stretch, window_s, fit.runs[0].path)
+
+
+def without(timeline: Timeline, stretch: tuple[float, float]) -> Timeline:
+    """The timeline with the measurements of a stretch taken away."""
+    inside = (timeline.t_s > stretch[0]) & (timeline.t_s <= stretch[1])
+    return replace(
+        timeline,
+        heading_row=np.where(inside, -1, timeline.heading_row).astype(np.int32),
+        fix_row=np.where(inside, -1, timeline.fix_row).astype(np.int32),
+    )
+
+
+def _judged(
+    problem: RunProblem,
+    theta: Floats,
+    covariance: Floats,
+    stretch: tuple[float, float],
+    window_s: float,
+    path: ForwardPass,
+    offset: tuple[float, float] | None = None,
+) -> Judged:
+    """Run the filter over the whole run from the given constants, and look at the stretch.
+
+    ``offset`` is what other runs say of the heading offset: mean (rad) and variance (rad²).
+    """
+    at = At(Constants.of(theta), theta[3:], path if problem.extra else None)
+    run = problem.begun(at, linearise_there=True)
+    learnt = np.r_[3:6, 10 : run.states]
+    run.P[np.ix_(learnt, learnt)] = covariance
+    if offset is not None and problem.options.with_offset and offset[1] < run.P[6, 6]:
+        run.x[2] += run.x[6] - offset[0]
+        run.x[6], run.P[6, 6] = offset
+    outage = run_with_outages(run, problem.aligned, problem.start, window_s)
+    windows = tuple(w for w in outage.windows if w.start_s >= stretch[0] - 1e-6 and w.end_s <= stretch[1] + 1e-6)
+    out = run.output
+    settled = max(stretch[0], problem.start.moving_from_s + SETTLED_S)
+    fix_t = problem.aligned.fix_t_s[problem.timeline.fix_index]
+    heading_t = problem.aligned.heading_t_s[problem.timeline.heading_index]
+    leading = problem.aligned.fix_leading[problem.timeline.fix_index]
+    fix = (fix_t > settled) & (fix_t <= stretch[1]) & leading & np.isfinite(out.fix_nu[:, 0])
+    heading = (heading_t > settled) & (heading_t <= stretch[1]) & np.isfinite(out.heading_nu)
+    see, snn, sen = out.fix_var[fix].T
+    e, n = out.fix_nu[fix].T
+    determinant = see * snn - sen**2
+    d2 = (snn * e**2 - 2.0 * sen * e * n + see * n**2) / determinant
+    nll_fix = 0.5 * (np.minimum(d2, 2.0 * CLIP) + np.log(determinant) + 2.0 * np.log(2.0 * np.pi)) / 2.0
+    nu, var = out.heading_nu[heading], out.heading_var[heading]
+    nll_heading = 0.5 * (np.minimum(nu**2 / var, CLIP) + np.log(2.0 * np.pi * var))
+    inlying = _inlying(e**2 + n**2, d2)
+    return Judged(
+        windows=windows,
+        window_s=window_s,
+        fix_m2=(e**2 + n**2)[inlying],
+        heading_rad2=nu**2,
+        nll=np.concatenate((np.repeat(nll_fix, 2), nll_heading)),
+    )
+
+
+def _inlying(squared: Floats, normalised: Floats) -> Bools:
+    """All but isolated wild fixes: those beyond the gate whose neighbours are not."""
+    wild = normalised > CLIP * 2.0
+    beside = np.concatenate((wild[1:], [False])) | np.concatenate(([False], wild[:-1]))
+    return np.asarray(~wild | beside | (squared <= np.median(squared)))
