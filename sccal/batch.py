@@ -8,15 +8,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sccal.align import Aligned, align
 from sccal.calibration.combine import combine
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.calibration.single import calibrate_run
+from sccal.diagnose.diagnose import diagnose
+from sccal.diagnose.result import Diagnosis
 from sccal.errors import DataError, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
+from sccal.filter.start import find_start
 from sccal.logs.run import RunSource, discover, read_run
 from sccal.logs.streams import Vehicle
+from sccal.report.diagnosis_write import write_diagnosis
 from sccal.report.write import begin_loading, write_calibration, write_vehicle
 
 
@@ -93,6 +98,42 @@ def calibrate_paths(
         write_vehicle(vehicle, out, stem)
         batch.vehicles.append((vehicle, out / f"{stem}.json"))
     return batch
+
+
+def diagnose_paths(
+    paths: Sequence[Path], out: Path, options: CalibrationOptions
+) -> tuple[list[tuple[Diagnosis, Path]], list[Failure]]:
+    """Diagnose every vehicle below the paths, all its runs together, and write what is found to out.
+
+    Several vehicles get a folder each below out. Returns every diagnosis with its page, and what gave no result.
+    """
+    sources, failures = find_runs(paths)
+    if sources:
+        _check_out(out, sources)
+        say_if_compiling()
+        begin_loading()
+    of_vehicle: dict[tuple[object, ...], list[Aligned]] = {}
+    for source in sources:
+        try:
+            aligned = align(read_run(source))
+            find_start(aligned)
+        except Exception as error:
+            failures.append(Failure(source.name, error if isinstance(error, SccalError) else _as_known(error)))
+            continue
+        of_vehicle.setdefault(_identity(aligned.vehicle), []).append(aligned)
+    diagnosed: list[tuple[Diagnosis, Path]] = []
+    taken: set[str] = set()
+    for runs in of_vehicle.values():
+        name = runs[0].vehicle.name
+        try:
+            diagnosis = diagnose(runs, options)
+            folder = out if len(of_vehicle) == 1 else out / _free_stem(_as_file_name(name), taken)
+            write_diagnosis(diagnosis, folder)
+        except Exception as error:
+            failures.append(Failure(name, error if isinstance(error, SccalError) else _as_known(error)))
+            continue
+        diagnosed.append((diagnosis, folder / "diagnosis.html"))
+    return diagnosed, failures
 
 
 def _as_known(error: Exception) -> SccalError:

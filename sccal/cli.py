@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from sccal import __version__
 from sccal.errors import Exit, SccalError, UsageError
 
 if TYPE_CHECKING:
+    from sccal.batch import Failure
     from sccal.calibration.result import Calibration
     from sccal.logs.run import RunSource
 
@@ -120,14 +122,19 @@ def calibrate(
         print()
         page = out / vehicle.runs[0].run / "report.html" if len(vehicle.runs) == 1 else file.with_suffix(".html")
         print(f"results in {out}/, report: {page}")
-    if batch.failures:
-        print()
-        for failure in batch.failures:
-            print(f"sccal: {failure.name}: {failure.error}", file=sys.stderr)
-        total = len(batch.failures) + len(batch.calibrated)
-        if total > 1:
-            print(f"sccal: {len(batch.failures)} of {total} gave no result", file=sys.stderr)
-        raise typer.Exit(int(max(failure.error.exit_code for failure in batch.failures)))
+    _tell_failures(batch.failures, len(batch.failures) + len(batch.calibrated))
+
+
+def _tell_failures(failures: Sequence[Failure], total: int) -> None:
+    """A line for every run that gave nothing, and the exit code of the worst."""
+    if not failures:
+        return
+    print()
+    for failure in failures:
+        print(f"sccal: {failure.name}: {failure.error}", file=sys.stderr)
+    if total > 1:
+        print(f"sccal: {len(failures)} of {total} gave no result", file=sys.stderr)
+    raise typer.Exit(int(max(failure.error.exit_code for failure in failures)))
 
 
 def _width() -> int:
@@ -142,6 +149,28 @@ def _tell(source: RunSource, result: Calibration | SccalError) -> None:
         from sccal.report.verdict import run_verdict
 
         print(f"{source.name}: {run_verdict(result)}", flush=True)
+
+
+@app.command()
+def diagnose(
+    paths: Paths,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
+    window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0,
+    heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0,
+) -> None:
+    """What the model lacks in the runs below PATHS: name it, add it, and judge before and after on data held out."""
+    from sccal.batch import diagnose_paths
+    from sccal.calibration.options import CalibrationOptions
+    from sccal.report.diagnosis_text import diagnosis_text
+
+    options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
+    diagnosed, failures = diagnose_paths(paths, out, options)
+    width = _width()
+    for diagnosis, page in diagnosed:
+        print(diagnosis_text(diagnosis, width), end="")
+        print()
+        print(f"results in {page.parent}/, report: {page}")
+    _tell_failures(failures, len(failures) + sum(len(diagnosis.runs) for diagnosis, _ in diagnosed))
 
 
 @app.command()

@@ -21,6 +21,7 @@ FLOORS = (
     {"effects"},
     {"filter"},
     {"calibration"},
+    {"diagnose"},
     {"report"},
     {"batch"},
     {"cli"},

@@ -36,7 +36,9 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
     full = np.zeros((4, 4))
     full[:3, :3] = covariance[:3, :3]
     full[3, 3] = offset.sigma**2
-    parameters = judge(np.append(at[:3], offset.value), full, vehicle, options, _pooled_drive(runs))
+    parameters = judge(
+        np.append(at[:3], offset.value), full, vehicle, options, pooled_drive([run.drive for run in runs])
+    )
     if chi2_per_dof is not None and chi2_per_dof > INCONSISTENT:
         what = (
             f"runs disagree about radii and track by {np.sqrt(chi2_per_dof):.1f} times what their sigmas allow; the "
@@ -120,8 +122,8 @@ def _combined_offset(runs: Sequence[Calibration]) -> tuple[Estimate, list[Notice
     return Estimate(value, sigma, "estimated"), []
 
 
-def _pooled_drive(runs: Sequence[Calibration]) -> Drive:
-    drives = [run.drive for run in runs]
+def pooled_drive(drives: Sequence[Drive]) -> Drive:
+    """All runs' drives together."""
     return Drive(
         duration_s=sum(d.duration_s for d in drives),
         distance_m=sum(d.distance_m for d in drives),

@@ -30,6 +30,8 @@ class Free:
 
     effect: Effect
     shapes: Mapping[str, float] = field(default_factory=dict)
+    prior_scale: float = 1.0
+    """Factor on the priors: below one for an effect that is in the model only because every log has a little of it."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -73,7 +75,7 @@ class FreeEffects:
     @property
     def prior_sigmas(self) -> Floats:
         """(m,) about zero, in file units."""
-        return np.array([parameter.prior_sigma for _, parameter in self.parameters])
+        return np.array([free.prior_scale * one.prior_sigma for free in self.effects for one in free.parameters])
 
     def columns(self, problem: RunProblem, at: At, clear: tuple[Floats, Floats]) -> Columns:
         """The kernel's columns, linearised at the given values along the given path."""
@@ -98,7 +100,7 @@ class FreeEffects:
         return found
 
 
-def view_run(problem: RunProblem, at: At, clear: tuple[Floats, Floats]) -> DriveView:
+def view_run(problem: RunProblem, at: At, clear: tuple[Floats, Floats] | None) -> DriveView:
     """The drive as columns see it, along the given path."""
     return view_drive(problem.aligned, problem.timeline, _belief(problem, at), clear)
 

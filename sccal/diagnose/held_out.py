@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -98,7 +99,7 @@ def stretches(problem: RunProblem) -> list[tuple[float, float]]:
     """Equal parts of the time after settling."""
     first = max(problem.start.until_s, problem.start.moving_from_s + SETTLED_S)
     edges = np.linspace(min(first, problem.aligned.span_s[1]), problem.aligned.span_s[1], STRETCHES + 1)
-    return [(float(a), float(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [(float(a), float(b)) for a, b in pairwise(edges)]
 
 
 def _on_others(model: Model, run: int, window_s: float) -> Judged:

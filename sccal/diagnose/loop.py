@@ -7,27 +7,32 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sccal.arrays import Floats
 from sccal.calibration.extension import Free
 from sccal.diagnose.evidence import Evidence, gather
 from sccal.diagnose.held_out import Judged, judge
-from sccal.diagnose.model import Accepted, Model, names_of, refitted
-from sccal.diagnose.pool import Pool, Score
-from sccal.effects.effect import Effect
+from sccal.diagnose.model import Accepted, Model, names_of, refitted, without_transport
+from sccal.diagnose.moments import Moment, find_moments
+from sccal.diagnose.placebo import Placebo
+from sccal.diagnose.pool import WHOLE_RUNS, Pool, Score
+from sccal.effects.effect import Effect, Parameter
 from sccal.effects.patterns import Pattern
 
 MIN_HELD_OUT_NATS = 8.0
-MIN_T = 4.0
+MIN_T = 4.5
 MIN_PATTERN_NATS = 12.0
-MIN_PATTERN_T = 4.5
+MIN_PATTERN_T = 5.0
+MIN_MOMENT_T = 6.0
 CLEARLY_BETTER_NATS = 5.0
 CLEARLY_BETTER = 1.25
-FLEXIBLE = 4.0
 MANY_SHAPES = 3
-"""A few waves of time or place follow anything that changes slowly or differs from place to place."""
+"""A few waves of time or place follow anything that changes slowly or from place to place: told, never added."""
 ALIAS_NATS = 3.0
 ALIAS_SHARE = 0.5
 MAX_FINDINGS = 8
 KEPT_T = 3.0
+HINT_NATS, HINT_T, MAX_HINTS = 3.0, 3.5, 3
+MIN_SWALLOWED_NATS = 15.0
 WORSE, MUCH_WORSE = 1.02, 1.15
 
 
@@ -36,50 +41,58 @@ class Step:
     """One acceptance, with what was known when it was made."""
 
     score: Score
+    free: Free
+    run: int | None
     indistinguishable_from: tuple[str, ...]
     ranking: tuple[Score, ...]
+    before: Judged
+    after: Judged
 
 
 @dataclass
 class Loop:
     """The model as it grew."""
 
+    first: Model
     model: Model
+    first_judged: Judged
     judged: Judged
     steps: list[Step] = field(default_factory=list)
     dropped: dict[str, str] = field(default_factory=dict)
     """Candidates that passed and were taken back, and why."""
-    last_pool: Pool | None = None
+    pool: Pool | None = None
+    """The evidence when nothing passed any more."""
+    placebo_nats: float = 0.0
+    """Largest held-out gain of a nonsense column, in any round."""
+    placebos_passed: int = 0
 
 
 def evidence_of(model: Model, candidates: Sequence[Effect]) -> list[Evidence]:
-    """One scoring pass per run."""
-    return [gather(problem, model.at(k), candidates) for k, problem in enumerate(model.problems)]
+    """One scoring pass per run; the time that lines take is held at zero there, for it is a candidate itself."""
+    return [gather(*without_transport(problem, model.at(k)), candidates) for k, problem in enumerate(model.problems)]
 
 
-def passes(score: Score, least_nats: float) -> bool:
+def passes(score: Score, least_nats: float = 0.0) -> bool:
     """Whether a candidate is a finding."""
     pattern = isinstance(score.effect, Pattern)
     nats, t = (MIN_PATTERN_NATS, MIN_PATTERN_T) if pattern else (MIN_HELD_OUT_NATS, MIN_T)
     return score.held_out_nats >= max(nats, least_nats) and score.t >= t and score.size >= 1.0
 
 
+def is_flexible(effect: Effect) -> bool:
+    """Whether it is a pattern that could follow anything slow."""
+    return isinstance(effect, Pattern) and len(effect.parameters) >= MANY_SHAPES
+
+
 def chosen(ranking: Sequence[Score], least_nats: float) -> Score | None:
     """The best that passes; a pattern without a name only where no effect with one does nearly as well."""
-    passing = [one for one in ranking if passes(one, least_nats)]
-    if not passing:
-        return None
+    passing = [one for one in ranking if passes(one, least_nats) and not is_flexible(one.effect)]
     named = next((one for one in passing if not isinstance(one.effect, Pattern)), None)
     pattern = next((one for one in passing if isinstance(one.effect, Pattern)), None)
     if named is None or pattern is None:
         return named or pattern
-    return pattern if pattern.held_out_nats > clearly_better_than(named, pattern) else named
-
-
-def clearly_better_than(named: Score, pattern: Score) -> float:
-    """Held-out nats a pattern needs to be taken before an effect with a name: the more, the more forms it can take."""
-    share = FLEXIBLE if pattern.values.size >= MANY_SHAPES else CLEARLY_BETTER
-    return max(share * named.held_out_nats, named.held_out_nats + CLEARLY_BETTER_NATS)
+    clearly = max(CLEARLY_BETTER * named.held_out_nats, named.held_out_nats + CLEARLY_BETTER_NATS)
+    return pattern if pattern.held_out_nats > clearly else named
 
 
 def aliases(pool: Pool, score: Score) -> tuple[str, ...]:
@@ -87,7 +100,7 @@ def aliases(pool: Pool, score: Score) -> tuple[str, ...]:
     name = score.effect.name
     found = []
     for other in pool.candidates:
-        if other.name == name or isinstance(other, Pattern) or not pool.rows(other.name).size:
+        if other.name == name or isinstance(other, Pattern | Placebo) or not pool.rows(other.name).size:
             continue
         alone = float(pool.held_out(other.name).sum())
         if alone < ALIAS_SHARE * score.held_out_nats:
@@ -98,63 +111,141 @@ def aliases(pool: Pool, score: Score) -> tuple[str, ...]:
 
 
 def run_loop(
-    model: Model, candidates: Sequence[Effect], least_nats: float = 0.0, window_s: float = 30.0
+    model: Model,
+    candidates: Sequence[Effect],
+    window_s: float,
+    with_moments: bool = True,
+    suggestions: Sequence[Score] = (),
 ) -> Loop:
-    """Grow the model until nothing passes."""
-    loop = Loop(model, judge(model, window_s))
+    """Grow the model until nothing passes; suggestions are effects found under another trust in the measurements."""
+    judged = judge(model, window_s)
+    loop = Loop(model, model, judged, judged)
     while True:
         inside = {one.free.effect.name for one in loop.model.accepted}
         left = [effect for effect in candidates if effect.name not in inside | set(loop.dropped)]
-        pool = Pool(evidence_of(loop.model, left), left)
-        loop.last_pool = pool
+        pool = loop.pool = Pool(evidence_of(loop.model, left), left)
+        placebos = pool.placebos()
+        loop.placebos_passed += sum(passes(one) for one in placebos)
+        least = max((one.held_out_nats for one in placebos), default=0.0)
+        loop.placebo_nats = max(loop.placebo_nats, least)
         ranking = pool.ranked()
-        best = chosen(ranking, least_nats)
-        if best is None or len(loop.steps) >= MAX_FINDINGS:
+        best = chosen(ranking, least)
+        moment = _best_moment(loop) if with_moments else None
+        if len(loop.steps) >= MAX_FINDINGS:
             return loop
-        step = Step(best, aliases(pool, best), tuple(ranking))
-        accepted = (*loop.model.accepted, Accepted(Free(best.effect)))
-        grown = refitted(loop.model, accepted, {best.effect.name: best.values})
-        judged = judge(grown, window_s)
-        doubt = _doubt(loop, grown, judged, best.effect)
+        if moment is not None and (best is None or moment.gain_nats > best.held_out_nats):
+            best = _as_score(moment)
+            accepted = Accepted(moment.free, moment.run)
+        elif best is not None:
+            accepted = Accepted(Free(best.effect))
+        elif not _swallowed(loop, ranking, suggestions, least, window_s):
+            return loop
+        else:
+            continue
+        grown = refitted(loop.model, (*loop.model.accepted, accepted), {best.effect.name: best.values})
+        after = judge(grown, window_s)
+        doubt = _doubt(loop.judged, after, grown, best.effect, accepted.run is not None)
         if doubt:
             loop.dropped[best.effect.name] = doubt
             continue
-        loop.model, loop.judged = grown, judged
-        loop.steps.append(step)
+        also = aliases(pool, best) if accepted.run is None else ()
+        loop.steps.append(Step(best, accepted.free, accepted.run, also, tuple(ranking), loop.judged, after))
+        loop.model, loop.judged = grown, after
 
 
-def _doubt(loop: Loop, grown: Model, judged: Judged, effect: Effect) -> str:
+def _swallowed(
+    loop: Loop, ranking: Sequence[Score], suggestions: Sequence[Score], least_nats: float, window_s: float
+) -> bool:
+    """Try effects that the noise may have been taken for: with the noise estimated anew, does the run become likelier?
+
+    A compass that drifts by 10 degrees is a compass with a slow error of 5, until the drift is in the model.
+    """
+    inside = {one.free.effect.name for one in loop.model.accepted}
+    hinted = [one for one in suggestions if one.effect.name not in inside | set(loop.dropped)]
+    promising = [one for one in ranking if one.held_out_nats > HINT_NATS and one.t > HINT_T and one.size >= 1.0]
+    tried: set[str] = set()
+    for score in (*hinted, *promising):
+        effect = score.effect
+        if isinstance(effect, Pattern) or effect.name in tried or len(tried) >= MAX_HINTS:
+            continue
+        tried.add(effect.name)
+        accepted = Accepted(Free(effect))
+        grown = refitted(loop.model, (*loop.model.accepted, accepted), {effect.name: score.values})
+        gain = _nll(loop.model) - _nll(grown)
+        size, t = size_in(grown, effect)
+        if gain < max(MIN_SWALLOWED_NATS, least_nats) or size < 1.0 or t < MIN_T:
+            continue
+        after = judge(grown, window_s)
+        if _doubt(loop.judged, after, grown, effect, False):
+            continue
+        values = np.array([float(v.mean()) for v, _, _ in values_in(grown, effect)])
+        sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, effect)])
+        found = Score(effect, gain, gain, t, values, sigmas)
+        loop.steps.append(Step(found, accepted.free, None, (), tuple(ranking), loop.judged, after))
+        loop.model, loop.judged = grown, after
+        return True
+    return False
+
+
+def _nll(model: Model) -> float:
+    """Negative log-likelihood of all runs, with a moderate price for noise far from its prior left out."""
+    return sum(one.path.nll_heading + one.path.nll_fix for one in model.fit.runs)
+
+
+def _best_moment(loop: Loop) -> Moment | None:
+    """The moment or place that stands out most in any run."""
+    found: list[Moment] = []
+    for run in range(len(loop.model.problems)):
+        known = [one.free.effect.name for one in loop.model.accepted if one.run == run]
+        found += find_moments(loop.model, run, [*known, *loop.dropped])
+    good = [one for one in found if one.gain_nats >= MIN_HELD_OUT_NATS and one.t >= MIN_MOMENT_T and one.size >= 1.0]
+    return max(good, key=lambda one: one.gain_nats, default=None)
+
+
+def _as_score(moment: Moment) -> Score:
+    gain = moment.gain_nats
+    return Score(moment.free.effect, gain, gain, moment.t, moment.values, moment.sigmas)
+
+
+def _doubt(before: Judged, after: Judged, grown: Model, effect: Effect, is_moment: bool) -> str:
     """Why an effect that passed is taken back once it is in the filter; empty where it stays."""
     size, t = size_in(grown, effect)
     if size < 1.0 or t < KEPT_T:
         return f"refitted it came out at {size:.1f} of the smallest size that matters, {t:.1f} of its sigma"
-    before, after = loop.judged, judged
-    if before.outage_end_rms_m and after.outage_end_rms_m:
-        worse = after.outage_end_rms_m / before.outage_end_rms_m
-        if worse > MUCH_WORSE or (worse > WORSE and after.nll_per_measurement > before.nll_per_measurement):
-            return f"with it the drift without fixes grew from {before.outage_end_rms_m:.2f} to {after.outage_end_rms_m:.2f} m"
+    if not is_moment and before.outage_end_rms_m and after.outage_end_rms_m:
+        first_m, then_m = before.outage_end_rms_m, after.outage_end_rms_m
+        worse = then_m / first_m
+        less_likely = after.nll_per_measurement > before.nll_per_measurement
+        whole_runs = len(grown.problems) >= WHOLE_RUNS
+        if worse > (WORSE if whole_runs or less_likely else MUCH_WORSE):
+            return f"with it the drift without fixes grew from {first_m:.2f} to {then_m:.2f} m"
     return ""
 
 
 def size_in(model: Model, effect: Effect) -> tuple[float, float]:
     """Size of an effect in a model: its largest parameter over the smallest that matters, and over its sigma."""
     size, t = 0.0, 0.0
-    for k, problem in enumerate(model.problems):
-        for j, (name, parameter) in enumerate(names_of(problem)):
-            if name != effect.name:
-                continue
-            one = next(p for p in effect.parameters if p.name == parameter)
-            value = abs(float(model.fit.each[k][3 + j]))
-            shared = 3 + j < model.fit.mode.size
-            variance = model.fit.robust[3 + j, 3 + j] if shared else model.fit.runs[k].covariance[3 + j, 3 + j]
-            size = max(size, value / max(one.matters, 1e-12))
-            t = max(t, value / float(np.sqrt(variance)))
+    for value, sigma, parameter in values_in(model, effect):
+        size = max(size, float(np.max(np.abs(value))) / max(parameter.matters, 1e-12))
+        t = max(t, float(np.max(np.abs(value) / sigma)))
     return size, t
 
 
-def sigma_of(model: Model, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Joint values and robust sigmas of one effect of the vehicle."""
-    problem = model.problems[0]
-    names = [(e.name, one.name) for e, one in problem.extension.parameters]  # type: ignore[union-attr]
-    rows = [3 + k for k, (effect, _) in enumerate(names) if effect == name]
-    return model.fit.each[0][rows], np.sqrt(np.diag(model.fit.robust)[[r for r in rows if r < model.fit.mode.size]])
+def values_in(model: Model, effect: Effect) -> list[tuple[Floats, Floats, Parameter]]:
+    """Per free parameter of an effect: its values and sigmas, one of the vehicle's or one per run, and itself."""
+    found = []
+    for parameter in Free(effect).parameters:
+        values, sigmas = [], []
+        for k, problem in enumerate(model.problems):
+            for j, name in enumerate(names_of(problem)):
+                if name != (effect.name, parameter.name):
+                    continue
+                shared = parameter.scope == "vehicle"
+                variance = model.fit.robust[3 + j, 3 + j] if shared else model.fit.runs[k].covariance[3 + j, 3 + j]
+                values.append(float(model.fit.each[k][3 + j]))
+                sigmas.append(float(np.sqrt(variance)))
+        if parameter.scope == "vehicle":
+            values, sigmas = values[:1], sigmas[:1]
+        if values:
+            found.append((np.array(values), np.array(sigmas), parameter))
+    return found

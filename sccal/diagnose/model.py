@@ -10,6 +10,7 @@ import numpy as np
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.calibration.extension import Free, FreeEffects
 from sccal.calibration.joint import JointFit, fit_jointly
+from sccal.effects.catalogue import effect_named
 from sccal.filter.forward import ForwardPass, Noise
 from sccal.filter.iterate import At, RunProblem, iterate
 from sccal.filter.noise import estimate_noise
@@ -24,6 +25,10 @@ PATH_HEADING_RAD = float(np.radians(0.2))
 PATH_FIX_M, PATH_SLIP = 2.0, 0.01
 PATH_ROUNDS = 6
 PATH_GATE_SIGMAS = 8.0
+TRANSPORT = Free(effect_named("gnss_latency"), prior_scale=0.1)
+"""Time that every line of a receiver is under way: about 20 ms that no log can show."""
+FROZEN = 1e-6
+"""Factor on a prior that holds an effect where it is."""
 STILL = 1e-5
 """Level of a noise that is switched off."""
 
@@ -39,6 +44,8 @@ class Regime:
     fix_rate_hz: float
     options: FilterOptions
     noise_of: NoiseOf
+    with_transport: bool
+    """Whether the time that lines take to arrive is in the model."""
 
     def timeline(self, aligned: Aligned) -> Timeline:
         """Events of a run."""
@@ -53,7 +60,7 @@ def fine_regime(options: FilterOptions, heading_rate_hz: float) -> Regime:
     def noise_of(aligned: Aligned, start: Start, extension: FreeEffects | None, first: At | None) -> Noise:
         return estimate_noise(aligned, start, options, heading_rate_hz, extension, first)
 
-    return Regime("fine", heading_rate_hz, 5.0, options, noise_of)
+    return Regime("fine", heading_rate_hz, 5.0, options, noise_of, True)
 
 
 def path_regime(options: FilterOptions) -> Regime:
@@ -66,9 +73,7 @@ def path_regime(options: FilterOptions) -> Regime:
     wide = replace(options, gate_sigmas=max(options.gate_sigmas, PATH_GATE_SIGMAS))
 
     def noise_of(aligned: Aligned, start: Start, extension: FreeEffects | None, first: At | None) -> Noise:
-        timeline = build_timeline(
-            aligned, OUTPUT_RATE_HZ, PATH_HEADING_HZ, PATH_FIX_HZ, wheel_rate_hz=WHEEL_RATE_HZ
-        )
+        timeline = build_timeline(aligned, OUTPUT_RATE_HZ, PATH_HEADING_HZ, PATH_FIX_HZ, wheel_rate_hz=WHEEL_RATE_HZ)
         stated_m = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
         fix_m, slip, at = PATH_FIX_M, PATH_SLIP, first
         for _ in range(PATH_ROUNDS):
@@ -82,7 +87,7 @@ def path_regime(options: FilterOptions) -> Regime:
             slip = float(np.clip(slip * np.sqrt(heading_nis), 0.001, 0.2))
         return noise
 
-    return Regime("path", PATH_HEADING_HZ, PATH_FIX_HZ, wide, noise_of)
+    return Regime("path", PATH_HEADING_HZ, PATH_FIX_HZ, wide, noise_of, False)
 
 
 @dataclass(frozen=True)
@@ -112,16 +117,20 @@ class Model:
         return self.fit.runs[run].path
 
 
-def extension_of(accepted: Sequence[Accepted], run: int) -> FreeEffects | None:
-    """The accepted effects that a run has: the vehicle's first, so that every run holds them in the same places."""
+def extension_of(regime: Regime, accepted: Sequence[Accepted], run: int) -> FreeEffects | None:
+    """The accepted effects that a run has: the vehicle's first, so that every run holds them in the same places.
+
+    Where details count, a latency of some 20 ms is always among them: lines take that long to arrive.
+    """
     mine = [one for one in accepted if one.run is None or one.run == run]
+    if regime.with_transport and not any(one.free.effect.name == TRANSPORT.effect.name for one in mine):
+        mine.append(Accepted(TRANSPORT))
 
     def own(one: Accepted) -> int:
         scopes = {parameter.scope for parameter in one.free.parameters}
         return 0 if scopes == {"vehicle"} else 1 if one.run is None else 2
 
-    effects = tuple(one.free for one in sorted(mine, key=own))
-    return FreeEffects(effects) if effects else None
+    return FreeEffects(tuple(one.free for one in sorted(mine, key=own))) if mine else None
 
 
 def first_model(runs: Sequence[Aligned], regime: Regime) -> Model:
@@ -129,8 +138,9 @@ def first_model(runs: Sequence[Aligned], regime: Regime) -> Model:
     problems = []
     for aligned in runs:
         start = find_start(aligned)
-        noise = regime.noise_of(aligned, start, None, None)
-        problems.append(RunProblem(aligned, regime.timeline(aligned), start, noise, regime.options))
+        extension = extension_of(regime, (), 0)
+        noise = regime.noise_of(aligned, start, extension, None)
+        problems.append(RunProblem(aligned, regime.timeline(aligned), start, noise, regime.options, extension))
     firsts = []
     for problem in problems:
         values, found = iterate(problem, problem.at_centre())
@@ -142,7 +152,7 @@ def refitted(model: Model, accepted: Sequence[Accepted], hints: dict[str, np.nda
     """The same runs with other effects, noise and fit anew; hints are first values (m,) of effects not yet in."""
     problems, firsts = [], []
     for k, before in enumerate(model.problems):
-        extension = extension_of(accepted, k)
+        extension = extension_of(model.regime, accepted, k)
         first = _carried(model, k, extension, hints)
         problem = replace(before, extension=extension)
         if new_noise:
@@ -168,8 +178,7 @@ def _carried(model: Model, run: int, extension: FreeEffects | None, hints: dict[
     for free in extension.effects:
         hint = hints.get(free.effect.name, np.zeros(len(free.parameters)))
         values += [
-            float(known.get((free.effect.name, one.name), h))
-            for one, h in zip(free.parameters, hint, strict=True)
+            float(known.get((free.effect.name, one.name), h)) for one, h in zip(free.parameters, hint, strict=True)
         ]
     return At(at.constants, np.array(values), at.path)
 
@@ -178,3 +187,14 @@ def names_of(problem: RunProblem) -> list[tuple[str, str]]:
     """Effect and parameter of everything that the filter holds beyond the paper's constants, in its order."""
     extension = problem.extension
     return [(e.name, one.name) for e, one in extension.parameters] if isinstance(extension, FreeEffects) else []
+
+
+def without_transport(problem: RunProblem, at: At) -> tuple[RunProblem, At]:
+    """The problem with the time that lines take held at zero."""
+    extension = problem.extension
+    if not isinstance(extension, FreeEffects) or TRANSPORT not in extension.effects:
+        return problem, at
+    effects = tuple(replace(free, prior_scale=FROZEN) if free == TRANSPORT else free for free in extension.effects)
+    held = np.array([name[0] == TRANSPORT.effect.name for name in names_of(problem)])
+    frozen = replace(problem, extension=FreeEffects(effects))
+    return frozen, At(at.constants, np.where(held, 0.0, at.values), at.path)

@@ -17,6 +17,7 @@ import numpy as np
 from sccal.arrays import Bools, Floats, Ints
 from sccal.calibration.extension import Free
 from sccal.diagnose.evidence import Evidence, prior_sigmas, rows_of
+from sccal.diagnose.placebo import Placebo
 from sccal.effects.effect import Effect
 from sccal.effects.patterns import Pattern
 
@@ -26,6 +27,7 @@ WHOLE_RUNS = 3
 NUISANCE = 0.5
 BOX_ROUNDS = 4
 PROMISING = 16
+PLACEBOS = 8
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Pool:
         owner: list[int] = []
         for k, one in enumerate(parameters):
             for run in range(runs):
-                self.where[run][k] = len(owner) if one.scope == "run" else len(owner)
+                self.where[run][k] = len(owner)
                 if one.scope == "run":
                     owner.append(k)
             if one.scope != "run":
@@ -75,7 +77,7 @@ class Pool:
         self.small = NUISANCE * np.where(least > 0, least, 0.1)[self.owner] if parameters else np.zeros(0)
         # Where the noise is not what the filter takes it for, a nat is worth less.
         self.evidence = [_deflated(one) for one in evidence]
-        self.folds = self._folds(WHOLE_RUNS <= runs)
+        self.folds = self._folds(runs >= WHOLE_RUNS)
         self.time_folds = self._folds(False) if runs >= WHOLE_RUNS else self.folds
 
     @property
@@ -105,8 +107,8 @@ class Pool:
     @cached_property
     def _named(self) -> Bools:
         """Which global parameters belong to effects with a name."""
-        patterns = [row for e in self.candidates if isinstance(e, Pattern) for row in self.local[e.name]]
-        return ~np.isin(self.owner, patterns)
+        unnamed = [row for e in self.candidates if isinstance(e, Pattern | Placebo) for row in self.local[e.name]]
+        return ~np.isin(self.owner, unnamed)
 
     def rows(self, *effects: str) -> Ints:
         """Global places of some candidates' parameters, all runs' copies."""
@@ -146,7 +148,7 @@ class Pool:
         gains = np.zeros(len(folds))
         for k, (u, information) in enumerate(folds):
             for chosen, held, sign in ((free, none, 1.0), (none, free, -1.0)):
-                values = self._solve(u_all - u, information_all - information, chosen, held)  # type: ignore[arg-type]
+                values = self._solve(u_all - u, information_all - information, chosen, held)
                 gains[k] += sign * float(values @ u - 0.5 * values @ information @ values)
         return gains
 
@@ -169,6 +171,13 @@ class Pool:
         held_out = float(self.held_out(effect.name).sum())
         return Score(effect, gain, held_out, t, np.array(means), np.array(sigmas))
 
+    def everything_free(self) -> Floats:
+        """Sigmas (G,) with every parameter free under its whole prior, in units of that prior."""
+        u, information = self.total
+        free = np.arange(self.size)
+        values = np.asarray(np.linalg.solve(information + np.eye(self.size), u), dtype=np.float64)
+        return np.asarray(np.sqrt(np.diag(self.robust(values, free))))
+
     def robust(self, values: Floats, free: Ints) -> Floats:
         """Covariance (G, G) from the scatter of the blocks' scores, at least what the model says."""
         _, information = self.total
@@ -190,8 +199,15 @@ class Pool:
 
     def ranked(self) -> list[Score]:
         """All candidates that any data speak of, the largest held-out gain first."""
-        spoken = [e for e in self.candidates if self.rows(e.name).size and np.any(self.total[0][self.rows(e.name)])]
-        promising = sorted(spoken, key=lambda e: -self._alone(self.rows(e.name)))[:PROMISING]
+        return self._best([e for e in self.candidates if not isinstance(e, Placebo)], PROMISING)
+
+    def placebos(self) -> list[Score]:
+        """The nonsense columns that gain most."""
+        return self._best([e for e in self.candidates if isinstance(e, Placebo)], PLACEBOS)
+
+    def _best(self, effects: Sequence[Effect], count: int) -> list[Score]:
+        spoken = [e for e in effects if self.rows(e.name).size and np.any(self.total[0][self.rows(e.name)])]
+        promising = sorted(spoken, key=lambda e: -self._alone(self.rows(e.name)))[:count]
         return sorted((self.score(e) for e in promising), key=lambda one: -one.held_out_nats)
 
     def _alone(self, rows: Ints) -> float:

@@ -1,0 +1,179 @@
+"""What a diagnosis found, with everything that a report needs: reports compute nothing.
+
+Angles are in radians here, but for effects' parameters, which are in the files' units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sccal.arrays import Floats
+from sccal.calibration.result import Estimate, Noise, OutageWindow, Parameters
+from sccal.logs.streams import Notice, Vehicle
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A residual against what it follows, before and after; all arrays are short enough to draw every point."""
+
+    x_label: str
+    """With unit: "turn rate, deg/s"."""
+    y_label: str
+    """With unit: "heading residual, deg"."""
+    x: Floats
+    """(k,) bin centres, or single points where there is no repetition."""
+    before: Floats
+    """(k,) mean residual without the effect."""
+    before_sigma: Floats
+    """(k,) standard error of that mean."""
+    after: Floats
+    """(k,) mean residual with the effect in the model."""
+    after_sigma: Floats
+    model: Floats
+    """(k,) what the effect adds there, as fitted."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate as it stood when a finding was made."""
+
+    name: str
+    title: str
+    named: bool
+    """False for a pattern without a name."""
+    held_out_gain_nats: float
+    t: float
+    size: float
+    """Largest parameter in units of the smallest size that matters."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect that was added to the model, in the order in which it was."""
+
+    name: str
+    title: str
+    reference: str
+    parameters: Mapping[str, Estimate]
+    units: Mapping[str, str]
+    """Of each parameter, "1" for ratios."""
+    held_out_gain_nats: float
+    t: float
+    indistinguishable_from: tuple[str, ...]
+    """Other effects that explain the same on this drive."""
+    advice: str
+    """What to drive to tell them apart; empty where nothing else explains it."""
+    ranking: tuple[Ranked, ...]
+    """The best candidates at that moment, best first; the chosen one among them."""
+    drift_before_m: float | None
+    """End of the outage windows, rms, held out, before and after this step."""
+    drift_after_m: float | None
+    picture: Picture | None
+
+
+@dataclass(frozen=True)
+class NotExcited:
+    """An effect that this drive could not have shown."""
+
+    name: str
+    title: str
+    advice: str
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """The smallest size of an effect that this drive would have shown."""
+
+    name: str
+    title: str
+    smallest: Mapping[str, float]
+    """By parameter, in the files' units."""
+    units: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Inseparable:
+    """Effects that this drive cannot tell apart, whichever of them is there."""
+
+    names: tuple[str, ...]
+    advice: str
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One model on data that did not fit it."""
+
+    windows: tuple[OutageWindow, ...]
+    window_s: float
+    outage_rms_m: float | None
+    outage_end_rms_m: float | None
+    outage_end_interval_m: tuple[float, float] | None
+    """Where the end drift lies with 90 % (bootstrap over windows)."""
+    gnss_innovation_rms_m: float
+    heading_innovation_rms_rad: float
+    nll_per_measurement: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left and has no name."""
+
+    significant: bool
+    port: str = ""
+    """heading, along, turn, side, antenna_forward, antenna_left, east or north; empty where nothing is significant."""
+    depends_on: str = ""
+    variance_fraction: float = 0.0
+    """Share of the error variance at that port that the pattern holds."""
+    held_out_gain_nats: float = 0.0
+    t: float = 0.0
+    size: str = ""
+    """In words: "up to 2.1 deg"."""
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True)
+class Placebo:
+    """The same test on nonsense columns: this log's own false alarms."""
+
+    tried: int
+    passed: int
+    highest_nats: float
+    """Largest held-out gain of a nonsense column."""
+    needed_nats: float
+    """What a finding needed in this log, at least."""
+
+
+@dataclass(frozen=True)
+class RunNoise:
+    """The noise of one run with the findings in the model."""
+
+    run: str
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole story of some runs of one vehicle."""
+
+    runs: tuple[str, ...]
+    vehicle: Vehicle
+    trust: str
+    """How the measurements were trusted, in a sentence."""
+    findings: tuple[Finding, ...]
+    patterns: tuple[str, ...]
+    """Patterns without a name that are in the model of ``after`` too: "antenna_forward with acceleration"."""
+    taken_back: Mapping[str, str]
+    """Candidates that passed the test and were taken back, and why."""
+    not_excited: tuple[NotExcited, ...]
+    detectable: tuple[Detectable, ...]
+    inseparable: tuple[Inseparable, ...]
+    before: Judgement
+    after: Judgement
+    held_out_how: str
+    unexplained: Unexplained
+    placebo: Placebo
+    parameters_before: Parameters
+    parameters_after: Parameters
+    noises: tuple[RunNoise, ...]
+    notices: tuple[Notice, ...]

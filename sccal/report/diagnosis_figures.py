@@ -1,0 +1,248 @@
+"""The figures of a diagnosis, as SVG text: a residual against its cause, drift before and after, candidates ranked.
+
+In the style of the other figures and, like them, through ``matplotlib.figure.Figure``. Orange-red is the model without
+the effect, blue the model with it, in every figure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from sccal.arrays import Bools, Floats
+from sccal.calibration.result import OutageWindow
+from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
+from sccal.report.diagnosis_text import something_added
+from sccal.report.figures import (
+    BLACK,
+    BLUE,
+    GREY,
+    SKY,
+    VERMILION,
+    Drawing,
+    _kept,
+    _plain_ticks,
+    _styled,
+    _svg,
+    _without_offset,
+)
+from sccal.report.numbers import one_line, plain, short
+from sccal.report.text import shortened
+
+RANKED_SHOWN = 8
+WINDOWS_SHOWN = 60
+BARS_UP_TO = 80
+"""Points beyond which error bars would only be a grey cloud: then the points stand alone."""
+GRID = 61
+"""Moments of a window at which the root mean square over the windows is drawn."""
+_WIDE_IN, _NARROW_IN = 9.6, 5.6
+_LABEL_CHARACTERS = 58
+
+
+def finding_drawings(d: Diagnosis, number: int) -> tuple[Drawing, ...]:
+    """What led to a finding: the residual against its cause, where there is a picture, and the candidates."""
+    finding = d.findings[number]
+    drawings = []
+    if finding.picture is not None and _drawable(finding.picture):
+        drawings.append(
+            Drawing(
+                f"residual-{number + 1}",
+                "Left: what the model without the effect leaves, averaged over stretches of the quantity that it "
+                "follows, with standard errors; the line is what the effect adds there, as fitted. Right: the same "
+                "with the effect in the model. What is explained lies on zero.",
+                residual_picture(finding.picture),
+            )
+        )
+    if finding.ranking:
+        drawings.append(
+            Drawing(
+                f"candidates-{number + 1}",
+                "What each candidate, alone, gains on data that did not fit it. Blue is the one that was added, light "
+                "blue are other effects, grey are patterns without a name. Left of the dashed line is what chance "
+                "can do in this log.",
+                candidates(finding, d.placebo.needed_nats),
+            )
+        )
+    return tuple(drawings)
+
+
+def unexplained_drawing(left: Unexplained) -> Drawing | None:
+    """The residual that has no name; None where there is nothing to draw."""
+    if not left.significant or left.picture is None or not _drawable(left.picture):
+        return None
+    return Drawing(
+        "unexplained",
+        "What the final model leaves, averaged over stretches of the quantity that it follows, with standard errors; "
+        "the line is the pattern as fitted. It has no name yet.",
+        residual_picture(left.picture, titles=("left by the final model", "with the pattern taken away")),
+    )
+
+
+def drift_drawing(d: Diagnosis) -> Drawing | None:
+    """Drift before and after; None where no window fits into the data."""
+    if not d.before.windows and not d.after.windows:
+        return None
+    return Drawing(
+        "drift",
+        f"How far dead reckoning strayed in each {short(d.after.window_s)} s without fixes (thin), and its root mean "
+        "square over all windows (thick), on data that did not fit the model.",
+        drift_before_after(d.before, d.after if something_added(d) else None),
+    )
+
+
+def residual_picture(picture: Picture, titles: tuple[str, str] = ("without the effect", "with the effect")) -> str:
+    """Before with the fitted effect, and after, on one scale; one panel where there is no after."""
+    after_known = bool(np.isfinite(picture.after).any())
+    with _styled("residual picture"):
+        figure = Figure(figsize=(_WIDE_IN, 3.3))
+        panels = list(figure.subplots(1, 2, sharey=True)) if after_known else [figure.add_subplot()]
+        figure.subplots_adjust(left=0.085, right=0.985, bottom=0.145, top=0.91, wspace=0.06)
+        for axes in panels:
+            axes.axhline(0.0, color=BLACK, lw=0.7)
+            axes.set_xlabel(one_line(picture.x_label))
+            axes.xaxis.set_major_locator(MaxNLocator(7))
+        order = np.argsort(picture.x, kind="stable")
+        panels[0].plot(picture.x[order], picture.model[order], color=BLACK, lw=1.4, label="the effect as fitted")
+        _points(panels[0], picture.x, picture.before, picture.before_sigma, VERMILION)
+        panels[0].set_title(titles[0])
+        panels[0].set_ylabel(one_line(picture.y_label))
+        if after_known:
+            _points(panels[1], picture.x, picture.after, picture.after_sigma, BLUE)
+            panels[1].set_title(titles[1])
+        panels[0].set_ylim(_limits(picture))
+        _plain_ticks(panels[0], 6)
+        for axes in panels:
+            _without_offset(axes)
+        return _svg(figure)
+
+
+def drift_before_after(before: Judgement, after: Judgement | None) -> str:
+    """Each window's drift since it began, and the root mean square over the windows; one model if nothing changed."""
+    if after is None:
+        models = [(before, BLUE, "as it is")]
+    else:
+        models = [(before, VERMILION, "before"), (after, BLUE, "after")]
+    with _styled("drift before after"):
+        figure = Figure(figsize=(_NARROW_IN, 3.9))
+        axes = figure.add_axes((0.13, 0.125, 0.84, 0.76))
+        highest = 0.0
+        drawn = [(judgement, colour, label) for judgement, colour, label in models if judgement.windows]
+        for judgement, colour, label in drawn:
+            _thin_lines(axes, judgement.windows, colour)
+            grid, rms = _rms_over(judgement.windows, judgement.window_s)
+            end = judgement.outage_end_rms_m
+            text = label if end is None else f"{label}: {plain(end, 3 if end >= 1.0 else 2)} m rms at the end"
+            axes.plot(grid, rms, color="white", lw=4.6, zorder=4)
+            axes.plot(grid, rms, color=colour, lw=2.8, zorder=5, label=text)
+            highest = max(highest, float(np.nan_to_num(rms).max()))
+        axes.set_xlim(0.0, before.window_s)
+        most = max((float(w.drift_m.max()) for j, _, _ in drawn for w in j.windows if len(w.drift_m)), default=1.0)
+        axes.set_ylim(0.0, 1.05 * min(most, 3.0 * highest or most) or 1.0)
+        axes.set_xlabel("time without fixes (s)")
+        axes.set_ylabel("drift (m)")
+        _plain_ticks(axes, 6)
+        if drawn:
+            axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.01), ncols=2, borderaxespad=0.0)
+        return _svg(figure)
+
+
+def candidates(finding: Finding, needed_nats: float) -> str:
+    """Horizontal bars, best first, each below its name; the chosen one is always among them."""
+    shown = list(finding.ranking[:RANKED_SHOWN])
+    if not any(one.name == finding.name for one in shown):
+        shown = [*shown[: RANKED_SHOWN - 1], *(one for one in finding.ranking if one.name == finding.name)]
+    gains = [one.held_out_gain_nats if math.isfinite(one.held_out_gain_nats) else 0.0 for one in shown]
+    with _styled("candidates"):
+        height = 0.6 + 0.42 * len(shown)
+        figure = Figure(figsize=(_NARROW_IN, height))
+        axes = figure.add_axes((0.03, 0.45 / height, 0.94, 1.0 - 0.5 / height))
+        places = np.arange(len(shown))
+        axes.barh(places, gains, height=0.36, color=[_colour(one, finding.name) for one in shown])
+        span = max(*gains, 0.0) - min(*gains, 0.0) or 1.0
+        for place, one, gain in zip(places, shown, gains, strict=True):
+            chosen = one.name == finding.name
+            axes.annotate(
+                _bar_label(one), (0.0, place - 0.2), (2, 1.5), textcoords="offset points", va="bottom", ha="left",
+                color=BLACK if one.named else "#666666", fontsize=8.0, fontweight="bold" if chosen else "normal",
+            )  # fmt: skip
+            axes.annotate(
+                plain(one.held_out_gain_nats, 3 if abs(gain) >= 100.0 else 2), (max(gain, 0.0), place),
+                (4, 0), textcoords="offset points", va="center", fontsize=8.0,
+            )  # fmt: skip
+        if math.isfinite(needed_nats) and 0.0 < needed_nats < 1.2 * span:
+            axes.axvline(needed_nats, color=VERMILION, lw=1.0, ls=(0, (4, 3)), zorder=3)
+        axes.set_xlim(min(*gains, 0.0) - 0.02 * span, max(*gains, 0.0) + 0.14 * span)
+        axes.set_ylim(len(shown) - 0.6, -0.75)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+        axes.grid(axis="y", visible=False)
+        axes.xaxis.set_major_locator(MaxNLocator(6))
+        axes.set_xlabel("gain on held-out data (nats)")
+        _without_offset(axes)
+        return _svg(figure)
+
+
+def _drawable(picture: Picture) -> bool:
+    return bool((np.isfinite(picture.x) & np.isfinite(picture.before)).any())
+
+
+def _points(axes: Axes, x: Floats, y: Floats, sigma: Floats, colour: str) -> None:
+    known: Bools = np.isfinite(x) & np.isfinite(y)
+    if int(known.sum()) > BARS_UP_TO:
+        axes.plot(x[known], y[known], "o", ms=3.0, mew=0, color=colour, alpha=0.6)
+        return
+    bars = np.where(np.isfinite(sigma), sigma, 0.0)
+    axes.errorbar(x[known], y[known], yerr=bars[known], fmt="o", ms=4.5, color=colour, elinewidth=1.1, capsize=0)
+
+
+def _limits(picture: Picture) -> tuple[float, float]:
+    """Room for all points and the line, but not for the bars of the worst known ones."""
+    values = [picture.before, picture.after, picture.model]
+    for points, sigma in ((picture.before, picture.before_sigma), (picture.after, picture.after_sigma)):
+        finite = sigma[np.isfinite(sigma)]
+        usual = 3.0 * float(np.median(finite)) if len(finite) else 0.0
+        bars = np.clip(np.nan_to_num(sigma), 0.0, usual)
+        values += [points - bars, points + bars]
+    every = np.concatenate([np.zeros(1), *values])
+    every = every[np.isfinite(every)]
+    low, high = float(every.min()), float(every.max())
+    margin = 0.08 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _thin_lines(axes: Axes, windows: Sequence[OutageWindow], colour: str) -> None:
+    every = max(1, math.ceil(len(windows) / WINDOWS_SHOWN))
+    shown = windows[::every]
+    alpha = 0.45 if len(shown) <= 12 else 0.22
+    for window in shown:
+        kept = _kept(window.drift_m, 60)
+        axes.plot((window.t_s - window.start_s)[kept], window.drift_m[kept], color=colour, lw=0.8, alpha=alpha)
+
+
+def _rms_over(windows: Sequence[OutageWindow], window_s: float) -> tuple[Floats, Floats]:
+    """Root mean square of the windows' drift at the moments of a grid, of those that have fixes around it."""
+    grid = np.linspace(0.0, window_s, GRID)
+    total, count = np.zeros(GRID), np.zeros(GRID)
+    for window in windows:
+        elapsed = window.t_s - window.start_s
+        if not len(elapsed):
+            continue
+        reached = grid <= elapsed[-1] + 0.5 * window_s / (GRID - 1)
+        total += np.where(reached, np.interp(grid, elapsed, window.drift_m) ** 2, 0.0)
+        count += reached
+    return grid, np.sqrt(np.where(count > 0, total / np.maximum(count, 1.0), np.nan))
+
+
+def _colour(one: Ranked, chosen: str) -> str:
+    if one.name == chosen:
+        return BLUE
+    return SKY if one.named else GREY
+
+
+def _bar_label(one: Ranked) -> str:
+    return shortened(one_line(f"{one.name}: {one.title}" if one.named else one.title), _LABEL_CHARACTERS)

@@ -1,0 +1,521 @@
+"""A diagnosis in words: what the terminal shows, and the sentences that the page shares with it.
+
+One sentence says what the machine does and what knowing it brings; then the numbers, then what limits them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+from sccal.calibration.result import Estimate
+from sccal.diagnose.result import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
+from sccal.effects.catalogue import CATALOGUE
+from sccal.report.numbers import MISSING, one_line, plain, short, value_and_sigma
+from sccal.report.rows import Row
+from sccal.report.text import _columns, _labelled, _notice_lines, _wrapped, shortened
+
+FINDINGS_IN_THE_VERDICT = 2
+ADVICE_SHOWN = 4
+INSEPARABLE_SHOWN = 3
+RUNS_NAMED = 4
+CERTAIN = 2.0
+"""Sigmas from which a direction is worth a word."""
+JSON = "diagnosis.json"
+
+_SENTENCES: dict[str, tuple[tuple[str, ...], Callable[..., str]]] = {}
+"""By effect: the parameters that its sentence needs, and the sentence."""
+
+_PORTS = {
+    "heading": "the heading readings",
+    "along": "the distance driven",
+    "turn": "the turning",
+    "side": "the sideways motion",
+    "antenna_forward": "the fixes, along the robot",
+    "antenna_left": "the fixes, across the robot",
+    "east": "the fixes, to the east",
+    "north": "the fixes, to the north",
+}
+
+
+def diagnosis_text(d: Diagnosis, width: int = 100) -> str:
+    """The whole story, short: about 35 lines where one or two effects were found."""
+    lines = [
+        *_wrapped(verdict_sentence(d), width),
+        "",
+        *_wrapped(f"{runs_line(d)}: {d.trust}" if d.trust else runs_line(d), width),
+        "",
+    ]
+    if d.findings:
+        lines += [*_findings_table(d.findings, width), ""]
+    lines += [*_judgement_table(d, width), *_wrapped(f"  ({d.held_out_how})", width, "  "), ""]
+    if not d.findings and d.detectable:
+        lines += _labelled("found if", [detectable_line(d.detectable)], width)
+    lines += [
+        *_labelled("or else", [line for f in d.findings if (line := doubt_sentence(f))], width),
+        *_labelled("left", [unexplained_sentence(d.unexplained), patterns_sentence(d)], width),
+        *_labelled("alike", _cut(inseparable_lines(d), INSEPARABLE_SHOWN), width),
+        *_labelled("unseen", _cut(unseen_lines(d), ADVICE_SHOWN), width),
+        *_labelled("back", [f"{name} was taken back: {why}" for name, why in d.taken_back.items()], width),
+        *_labelled("chance", [placebo_sentence(d)], width),
+        *_labelled("noise", [noise_line(d.noises)], width),
+        *_labelled("notices", _notice_lines([("", notice) for notice in d.notices], JSON), width),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def verdict_sentence(d: Diagnosis) -> str:
+    """What an engineer can act on, and what it brings, in one sentence."""
+    if d.findings:
+        return f"{_and([cause_clause(f) for f in d.findings], d)}: {brings_clause(d)}"
+    if d.unexplained.significant or d.patterns:
+        return "no effect with a name was found, but something is there: " + (
+            unexplained_sentence(d.unexplained) if d.unexplained.significant else patterns_sentence(d)
+        )
+    return (
+        f"nothing that the model lacks was found: {judged_by(d)}, no effect explains more than chance does; "
+        f"{_drift_now(d.before)}"
+    )
+
+
+def cause_clause(finding: Finding) -> str:
+    """What the machine does: "the antenna sits 0.74 m to the right of the track centre"."""
+    where, tilde, column = finding.name.partition("~")
+    needed, sentence = _SENTENCES.get(where if tilde else finding.name, ((), _generic))
+    estimates = [finding.parameters[name] for name in needed if name in finding.parameters]
+    if not needed or len(estimates) < len(needed) or not all(math.isfinite(e.value) for e in estimates):
+        return _generic(finding)
+    return one_line(sentence(column, *estimates) if tilde else sentence(*estimates))
+
+
+def brings_clause(d: Diagnosis) -> str:
+    """What the findings bring where nothing was fitted."""
+    with_it = {1: "it", 2: "both"}.get(len(d.findings), "all of them")
+    if d.patterns:
+        with_it += f" and {_count(len(d.patterns), 'pattern')} without a name"
+    return f"with {with_it} {change_clause(d.before, d.after)}, {judged_by(d)}"
+
+
+def change_clause(before: Judgement, after: Judgement) -> str:
+    """The drift without fixes before and after; the fixes' innovation where no window was long enough."""
+    if before.outage_end_rms_m is None or after.outage_end_rms_m is None:
+        return "the innovation of the fixes " + _change(before.gnss_innovation_rms_m, after.gnss_innovation_rms_m, "m")
+    change = _change(before.outage_end_rms_m, after.outage_end_rms_m, "m")
+    return f"the drift after {short(after.window_s)} s without fixes {change}"
+
+
+def judged_by(d: Diagnosis) -> str:
+    """Which data had the word: the short form of ``held_out_how``."""
+    data = "runs" if len(d.runs) > 1 else "stretches of the run"
+    return f"judged on {data} that were not used for fitting"
+
+
+def doubt_sentence(finding: Finding) -> str:
+    """What else explains the same, and what would tell; empty where nothing does."""
+    if not finding.indistinguishable_from:
+        return ""
+    others = " or ".join(one_line(name) for name in finding.indistinguishable_from)
+    advice = f"; to tell: {one_line(finding.advice)}" if finding.advice else ""
+    return f"{one_line(finding.name)} could as well be {others}{advice}"
+
+
+def unexplained_sentence(left: Unexplained) -> str:
+    """What is left and has no name."""
+    if not left.significant:
+        return "nothing more than chance leaves"
+    port = _PORTS.get(left.port, left.port)
+    facts = [
+        left.size,
+        f"{plain(100.0 * left.variance_fraction, 2)} % of its variance",
+        f"{_nats(left.held_out_gain_nats)} held out",
+        f"t {plain(left.t, 2)}",
+    ]
+    return one_line(f"the error of {port} follows {left.depends_on} ({', '.join(fact for fact in facts if fact)})")
+
+
+def patterns_sentence(d: Diagnosis) -> str:
+    """Patterns that were added without a name; empty where there are none."""
+    if not d.patterns:
+        return ""
+    return f"in the model without a name: {'; '.join(one_line(one) for one in d.patterns)}"
+
+
+def inseparable_lines(d: Diagnosis) -> list[str]:
+    """Effects that look the same on this drive."""
+    return [
+        " and ".join(one_line(name) for name in one.names) + (f": {one_line(one.advice)}" if one.advice else "")
+        for one in d.inseparable
+    ]
+
+
+def unseen_lines(d: Diagnosis) -> list[str]:
+    """What this drive could not show, by what to drive."""
+    by_advice: dict[str, list[str]] = {}
+    for one in d.not_excited:
+        by_advice.setdefault(one_line(one.advice), []).append(one_line(one.name))
+    return [f"{', '.join(names)}: {advice}" if advice else ", ".join(names) for advice, names in by_advice.items()]
+
+
+def detectable_line(detectable: Iterable[Detectable]) -> str:
+    """The smallest effects that would have been found."""
+    return "; ".join(f"{one_line(one.name)} {smallest_text(one)}" for one in detectable)
+
+
+def smallest_text(one: Detectable) -> str:
+    """``forward_m 0.03 m, left_m 0.02 m``; a parameter that is only a unit goes without its name."""
+    parts = []
+    for name, size in one.smallest.items():
+        unit = _unit(one.units.get(name, ""))
+        size_text = f"{plain(size, 2)} {unit}".strip()
+        parts.append(size_text if len(one.smallest) == 1 else f"{name} {size_text}")
+    return ", ".join(parts)
+
+
+def placebo_sentence(d: Diagnosis) -> str:
+    """This log's own false alarms."""
+    if not d.placebo.tried:
+        return "no nonsense column was tried, so how often chance passes is not known"
+    passed = "none" if not d.placebo.passed else str(d.placebo.passed)
+    return (
+        f"{passed} of {_count(d.placebo.tried, 'nonsense column')} passed the same test; the best gained "
+        f"{_nats(d.placebo.highest_nats)}, a finding needed {_nats(d.placebo.needed_nats)}"
+    )
+
+
+def noise_line(noises: Sequence[RunNoise]) -> str:
+    """The noise that is left with the findings in the model, over all runs."""
+    if not noises:
+        return ""
+    all_of = [one.noise for one in noises]
+    degrees = math.degrees
+    heading = _spread([degrees(n.heading_white_rad) for n in all_of], "deg")
+    coloured = _spread([degrees(n.heading_coloured_rad) for n in all_of], "deg")
+    fixes = _spread([n.fix_scale for n in all_of], "")
+    wander = _spread([n.fix_coloured_m for n in all_of], "m")
+    wheels = _spread([n.slip_m_per_sqrt_m for n in all_of], "m")
+    return (
+        f"heading {heading} white + {coloured} correlated, fixes {fixes} x stated sigma + {wander} correlated, "
+        f"wheels {wheels} after 1 m"
+    )
+
+
+def runs_line(d: Diagnosis) -> str:
+    """Vehicle and runs."""
+    names = [shortened(one_line(run), 40) for run in d.runs[:RUNS_NAMED]]
+    more = f" and {len(d.runs) - RUNS_NAMED} more" if len(d.runs) > RUNS_NAMED else ""
+    return f"{one_line(d.vehicle.name)}, {_count(len(d.runs), 'run')} ({', '.join(names)}{more})"
+
+
+def judgement_rows(d: Diagnosis) -> list[tuple[str, str, str, str]]:
+    """What is judged, its unit, before and after."""
+    b, a = d.before, d.after
+    heading_deg = [math.degrees(one.heading_innovation_rms_rad) for one in (b, a)]
+    return [
+        (f"drift after {short(a.window_s)} s without fixes", "m rms", _end_drift(b), _end_drift(a)),
+        ("drift on the way there", "m rms", _or_dash(b.outage_rms_m), _or_dash(a.outage_rms_m)),
+        ("innovation of the fixes", "m rms", plain(b.gnss_innovation_rms_m), plain(a.gnss_innovation_rms_m)),
+        ("innovation of the heading", "deg rms", plain(heading_deg[0]), plain(heading_deg[1])),
+        ("loss per measurement", "nats", _fixed(b.nll_per_measurement), _fixed(a.nll_per_measurement)),
+    ]
+
+
+def something_added(d: Diagnosis) -> bool:
+    """False where before and after are the same model."""
+    return bool(d.findings or d.patterns)
+
+
+def finding_rows(finding: Finding) -> tuple[Row, ...]:
+    """The parameters of a finding under their names in the files."""
+    return tuple(
+        Row(f"{finding.name}.{name}", one_line(name), _unit(finding.units.get(name, "")), estimate)
+        for name, estimate in finding.parameters.items()
+    )
+
+
+def title_of(name: str, d: Diagnosis) -> str:
+    """What an effect is, in a few words; its name where nothing says more."""
+    titles = {one.name: one.title for one in d.not_excited}
+    titles |= {one.name: one.title for one in d.detectable}
+    titles |= {one.name: one.title for f in d.findings for one in f.ranking}
+    titles |= {f.name: f.title for f in d.findings}
+    return titles.get(name) or (CATALOGUE[name].title if name in CATALOGUE else name)
+
+
+def _findings_table(findings: Sequence[Finding], width: int) -> list[str]:
+    table = [("effect", "parameter", "value", "", "unit", "nats held out", "t")]
+    reasons = []
+    for finding in findings:
+        for k, row in enumerate(finding_rows(finding)):
+            first = k == 0
+            table.append(
+                (
+                    shortened(one_line(finding.name), max(width // 4, 12)) if first else "",
+                    shortened(row.name, 16),
+                    row.value,
+                    f"± {row.sigma}" if row.sigma not in ("", MISSING) else "",
+                    row.unit,
+                    plain(finding.held_out_gain_nats, 3) if first else "",
+                    plain(finding.t, 2) if first else "",
+                )
+            )
+            if row.estimate.status != "estimated":
+                reasons.append(f"{finding.name} {row.name}: {row.status}; {row.reason}".removesuffix("; "))
+    return [*_columns(table, "<<><<>>"), *(line for reason in reasons for line in _wrapped(reason, width, "  "))]
+
+
+def _judgement_table(d: Diagnosis, width: int) -> list[str]:
+    header = ("held out", "", "before", "after") if something_added(d) else ("held out", "", "as it is", "")
+    table = [header, *(row if something_added(d) else (*row[:3], "") for row in judgement_rows(d))]
+    room = width - sum(2 + max(map(len, column)) for column in list(zip(*table, strict=True))[1:])
+    return _columns([(shortened(what, max(room, 8)), *rest) for what, *rest in table], "<<>>")
+
+
+def _end_drift(judgement: Judgement) -> str:
+    if judgement.outage_end_rms_m is None:
+        return "-"
+    interval = judgement.outage_end_interval_m
+    between = "" if interval is None else f" ({plain(interval[0], 2)} … {plain(interval[1], 2)})"
+    return f"{plain(judgement.outage_end_rms_m, 3)}{between}"
+
+
+def _drift_now(judgement: Judgement) -> str:
+    window = short(judgement.window_s)
+    if judgement.outage_end_rms_m is None:
+        return f"no window of {window} s without fixes fits into the data"
+    return f"the drift after {window} s without fixes is {_about(judgement.outage_end_rms_m)} m"
+
+
+def _fixed(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else MISSING
+
+
+def _or_dash(value: float | None) -> str:
+    return "-" if value is None else plain(value, 3)
+
+
+def _change(before: float, after: float, unit: str) -> str:
+    was, now = _about(before), _about(after)
+    if was == now:
+        return f"stays at {now} {unit}"
+    return f"{'falls' if after < before else 'rises'} from {was} {unit} to {now} {unit}"
+
+
+def _about(value: float) -> str:
+    """Three digits from one on, two below: 1.37, 12.3, 0.86, 0.055."""
+    return plain(value, 3 if abs(value) >= 1.0 else 2)
+
+
+def _nats(value: float) -> str:
+    return f"{plain(value, 3 if abs(value) >= 100.0 else 2)} nats"
+
+
+def _spread(values: Sequence[float], unit: str) -> str:
+    low, high = (plain(of, 2) for of in (min(values), max(values)))
+    return f"{low if low == high else f'{low} … {high}'} {unit}".strip()
+
+
+def _and(clauses: Sequence[str], d: Diagnosis) -> str:
+    shown, rest = clauses[:FINDINGS_IN_THE_VERDICT], d.findings[FINDINGS_IN_THE_VERDICT:]
+    text = ", and ".join(shown)
+    if not rest:
+        return text
+    return f"{text}, and {_count(len(rest), 'more effect')} ({', '.join(one_line(f.name) for f in rest)})"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _cut(lines: Sequence[str], most: int) -> list[str]:
+    if len(lines) <= most:
+        return list(lines)
+    return [*lines[:most], f"… and {len(lines) - most} more in {JSON}"]
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def _generic(finding: Finding) -> str:
+    values = []
+    for name, estimate in finding.parameters.items():
+        number = value_and_sigma(estimate.value, estimate.sigma)[0]
+        if number != MISSING:
+            values.append(f"{name} {number} {_unit(finding.units.get(name, ''))}".strip())
+    return one_line(finding.title + (f" ({', '.join(values)})" if values else ""))
+
+
+def _says(effect: str, parameters: str) -> Callable[[Callable[..., str]], Callable[..., str]]:
+    """Register the sentence of an effect, with the parameters that it takes in their order."""
+
+    def register(sentence: Callable[..., str]) -> Callable[..., str]:
+        _SENTENCES[effect] = (tuple(parameters.split()), sentence)
+        return sentence
+
+    return register
+
+
+def _size(estimate: Estimate) -> str:
+    return _about(abs(estimate.value))
+
+
+def _percent(estimate: Estimate) -> str:
+    return f"{_about(100.0 * abs(estimate.value))} %"
+
+
+def _amplitude(one: Estimate, other: Estimate) -> float:
+    return math.hypot(one.value, other.value)
+
+
+def _sense(estimate: Estimate) -> str:
+    return "to the left (counter-clockwise)" if estimate.value > 0.0 else "to the right (clockwise)"
+
+
+def _less(estimate: Estimate, below_zero: str = "further") -> str:
+    return "less" if estimate.value > 0.0 else below_zero
+
+
+@_says("lever_arm", "forward_m left_m")
+def _lever_arm(forward: Estimate, left: Estimate) -> str:
+    parts = [
+        (abs(forward.value), forward, f"{_size(forward)} m {'ahead' if forward.value > 0.0 else 'behind'}"),
+        (abs(left.value), left, f"{_size(left)} m to the {'left' if left.value > 0.0 else 'right'}"),
+    ]
+    largest = max(size for size, _, _ in parts)
+    words = [
+        text for size, e, text in parts if size == largest or size > CERTAIN * e.sigma or not math.isfinite(e.sigma)
+    ]
+    return f"the antenna sits {' and '.join(words)} of the track centre".replace("behind of", "behind")
+
+
+@_says("gnss_latency", "s")
+def _gnss_latency(age: Estimate) -> str:
+    return f"the fixes show where the antenna was {_size(age)} s {'before' if age.value > 0.0 else 'after'} their stamp"
+
+
+@_says("heading_latency", "s")
+def _heading_latency(age: Estimate) -> str:
+    return (
+        f"the AHRS readings show the heading of {_size(age)} s {'before' if age.value > 0.0 else 'after'} their stamp"
+    )
+
+
+@_says("clock_skew", "ppm")
+def _clock_skew(rate: Estimate) -> str:
+    return f"the fixes' clock runs {_size(rate)} ppm {'fast' if rate.value > 0.0 else 'slow'} against the wheels'"
+
+
+@_says("hard_iron", "cos_deg sin_deg")
+def _hard_iron(cos: Estimate, sin: Estimate) -> str:
+    return f"magnetised parts near the compass turn it by up to {_about(_amplitude(cos, sin))} deg, once per full turn"
+
+
+@_says("soft_iron", "cos2_deg sin2_deg")
+def _soft_iron(cos: Estimate, sin: Estimate) -> str:
+    return f"iron near the compass turns it by up to {_about(_amplitude(cos, sin))} deg, twice per full turn"
+
+
+@_says("speed_field", "deg_per_mps")
+def _speed_field(rate: Estimate) -> str:
+    return f"the motors' field turns the compass by {_size(rate)} deg {_sense(rate)} for each m/s of speed"
+
+
+@_says("heading_drift", "deg_per_hour")
+def _heading_drift(rate: Estimate) -> str:
+    return f"the AHRS heading drifts by {_size(rate)} deg an hour {_sense(rate)}"
+
+
+@_says("heading_step", "deg at_s")
+def _heading_step(jump: Estimate, at: Estimate) -> str:
+    return f"the AHRS heading jumps by {_size(jump)} deg {_sense(jump)} {_moment(at)}"
+
+
+@_says("radius_step", "ratio at_s")
+def _radius_step(ratio: Estimate, at: Estimate) -> str:
+    return f"both wheels' radii {'grow' if ratio.value > 0.0 else 'shrink'} by {_percent(ratio)} {_moment(at)}"
+
+
+@_says("base_shift", "east_m north_m at_s")
+def _base_shift(east: Estimate, north: Estimate, at: Estimate) -> str:
+    return f"all fixes jump by {_about(_amplitude(east, north))} m {_moment(at)}"
+
+
+@_says("radius_drift", "per_hour")
+def _radius_drift(rate: Estimate) -> str:
+    return f"both wheels' radii {'grow' if rate.value > 0.0 else 'shrink'} by {_percent(rate)} an hour"
+
+
+@_says("turn_slip", "per_radps")
+def _turn_slip(rate: Estimate) -> str:
+    return f"the robot turns {_percent(rate)} {_less(rate, 'more')} than its wheels say for each rad/s of turn rate"
+
+
+@_says("turn_scrub", "per_radps")
+def _turn_scrub(rate: Estimate) -> str:
+    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each rad/s of turn rate"
+
+
+@_says("speed_slip", "per_mps")
+def _speed_slip(rate: Estimate) -> str:
+    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s of speed"
+
+
+@_says("brake_slip", "per_mps2")
+def _brake_slip(rate: Estimate) -> str:
+    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s² of braking"
+
+
+@_says("drive_slip", "per_mps2")
+def _drive_slip(rate: Estimate) -> str:
+    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s² of speeding up"
+
+
+@_says("side_slip", "s")
+def _side_slip(time: Estimate) -> str:
+    way = "outwards" if time.value > 0.0 else "inwards"
+    return f"the robot slides {way} in turns, at {_size(time)} m/s for each m/s² of sideways acceleration"
+
+
+@_says("missed_left", "ratio")
+def _missed_left(ratio: Estimate) -> str:
+    return f"the left wheel's counter {'loses' if ratio.value > 0.0 else 'adds'} {_percent(ratio)} of its counts"
+
+
+@_says("missed_right", "ratio")
+def _missed_right(ratio: Estimate) -> str:
+    return f"the right wheel's counter {'loses' if ratio.value > 0.0 else 'adds'} {_percent(ratio)} of its counts"
+
+
+@_says("local_field", "deg east_m north_m radius_m")
+def _local_field(deg: Estimate, east: Estimate, north: Estimate, radius: Estimate) -> str:
+    place = f"{plain(east.value)} m east, {plain(north.value)} m north of the run's origin"
+    return f"within about {_size(radius)} m of one place ({place}) the compass is turned by up to {_size(deg)} deg"
+
+
+@_says("heading", "deg_per_unit")
+def _heading_column(column: str, slope: Estimate) -> str:
+    return f"the AHRS heading turns with {column}, by {_size(slope)} deg {_sense(slope)} per unit"
+
+
+@_says("along", "per_unit")
+def _along_column(column: str, slope: Estimate) -> str:
+    return f"the distance driven changes with {column}, by {_signed_percent(slope)} per unit"
+
+
+@_says("yaw", "per_unit")
+def _yaw_column(column: str, slope: Estimate) -> str:
+    return f"the turning changes with {column}, by {_signed_percent(slope)} per unit"
+
+
+@_says("side", "per_unit")
+def _side_column(column: str, slope: Estimate) -> str:
+    way = "left" if slope.value > 0.0 else "right"
+    return f"{column} pushes the robot to the {way}, by {_percent(slope)} of the distance driven per unit"
+
+
+def _signed_percent(estimate: Estimate) -> str:
+    return f"{'+' if estimate.value > 0.0 else '-'}{_percent(estimate)}"
+
+
+def _moment(at: Estimate) -> str:
+    return f"{plain(at.value, 3)} s after the run's start"
