@@ -14,6 +14,7 @@ from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.calibration.single import calibrate_run
 from sccal.diagnose.diagnose import diagnose
+from sccal.diagnose.honest import with_honest_effects, with_honest_vehicle
 from sccal.diagnose.result import Diagnosis
 from sccal.errors import DataError, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
@@ -80,6 +81,8 @@ def calibrate_paths(
     for source in sources:
         try:
             calibration, problem = calibrate_run(read_run(source), options)
+            if options.effects:
+                calibration = with_honest_effects(calibration, problem)
             write_calibration(calibration, out / source.name)
         except Exception as error:
             known = error if isinstance(error, SccalError) else _as_known(error)
@@ -91,7 +94,10 @@ def calibrate_paths(
         tell(source, calibration)
     taken: set[str] = set()
     for members in of_vehicle.values():
-        vehicle = combine([one for one, _ in members], [problem for _, problem in members])
+        problems = [problem for _, problem in members]
+        vehicle = combine([one for one, _ in members], problems)
+        if options.effects and len(members) > 1:
+            vehicle = with_honest_vehicle(vehicle, problems)
         stem = (
             "vehicle" if len(of_vehicle) == 1 else _free_stem(f"vehicle-{_as_file_name(vehicle.vehicle.name)}", taken)
         )

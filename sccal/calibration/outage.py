@@ -45,7 +45,7 @@ def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: floa
             predicted.append((begin, end, rows, scratch.antenna[rows].copy()))
         begin = end
     run.run_to()
-    outlying = _isolated(~run.output.fix_ok, run.options.recover_count)
+    outlying = isolated(~run.output.fix_ok, run.options.recover_count)
     windows = []
     for begin, end, rows, antenna in predicted:
         kept = ~outlying[rows]
@@ -68,7 +68,7 @@ def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: floa
     return summarise(windows, window_s, HOW.format(first=settled - start.moving_from_s))
 
 
-def _isolated(rejected: Bools, too_many: int) -> Bools:
+def isolated(rejected: Bools, too_many: int) -> Bools:
     """Rejected fixes in streaks too short to mean that the filter, not the fix, was wrong: outliers judge nothing."""
     padded = np.concatenate(([False], rejected, [False]))
     change = np.flatnonzero(np.diff(padded.astype(np.int8)))

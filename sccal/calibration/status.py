@@ -6,7 +6,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Drive, Estimate, Parameters
-from sccal.filter.forward import prior_covariance
+from sccal.filter.forward import Noise, prior_covariance
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.logs.streams import Vehicle
@@ -14,6 +14,20 @@ from sccal.logs.streams import Vehicle
 UNOBSERVED_RATIO = 0.5
 """A parameter whose sigma is still more than this share of its prior's was not moved off the prior by the data."""
 OFFSET_UNOBSERVED_RAD = np.radians(10.0)
+FIX_WANDER_MOST = 5.0
+"""Correlated fix error over the stated sigma: beyond, it is hardly the receiver that wanders."""
+HEADING_WANDER_MOST_RAD = np.radians(3.0)
+"""Correlated heading error: beyond, iron near the compass or a wrong clock is likelier than the AHRS itself."""
+
+
+def fixes_wander(noise: Noise) -> bool:
+    """Whether the fixes err slowly by far more than they state."""
+    return bool(noise.fix_coloured_m > FIX_WANDER_MOST * noise.fix_stated_m)
+
+
+def heading_wanders(noise: Noise) -> bool:
+    """Whether the heading errs slowly by more than an AHRS does."""
+    return bool(noise.heading_coloured_rad > HEADING_WANDER_MOST_RAD)
 
 
 def judge(

@@ -31,10 +31,15 @@ def linear_effects() -> tuple[Effect, ...]:
 def confounded_sigmas(model: Model) -> dict[tuple[str, str], Floats]:
     """Sigmas of the found effects, by effect and parameter: one value, or one per run where it is a run's."""
     found = [one.free.effect for one in model.accepted if not one.free.shapes]
+    return sigmas_beside_all([(p, model.at(k)) for k, p in enumerate(model.problems)], found)
+
+
+def sigmas_beside_all(runs: Sequence[tuple[RunProblem, At]], found: Sequence[Effect]) -> dict[tuple[str, str], Floats]:
+    """The same for effects that are free in some problems, each with where it was linearised at last."""
     names = {effect.name for effect in found}
     beside = [effect for effect in linear_effects() if effect.name not in names]
     everything = (*found, *beside)
-    pool = Pool([_evidence(p, model.at(k), everything) for k, p in enumerate(model.problems)], everything)
+    pool = Pool([_evidence(problem, at, everything) for problem, at in runs], everything)
     sigma = pool.everything_free()
     sigmas: dict[tuple[str, str], Floats] = {}
     for effect in found:

@@ -22,6 +22,7 @@ from sccal.calibration.status import judge as judge_parameters
 from sccal.diagnose.confounded import confounded_sigmas, linear_effects
 from sccal.diagnose.excitation import excitation
 from sccal.diagnose.held_out import Judged, how
+from sccal.diagnose.honest import under_other_trust
 from sccal.diagnose.loop import MIN_HELD_OUT_NATS, Loop, Step, is_flexible, passes, run_loop, values_in
 from sccal.diagnose.model import Model, Regime, fine_regime, first_model, path_regime
 from sccal.diagnose.picture import picture_of
@@ -36,7 +37,8 @@ from sccal.effects.effect import Effect
 from sccal.effects.logged import logged_effects
 from sccal.effects.patterns import PATTERNS, Pattern
 
-BETTER = 0.98
+BETTER, CLEARLY, GROSS = 0.98, 0.75, 0.6
+"""Shares of a drift: hardly better, clearly better, and what only an effect beyond all noise can bring about."""
 TRANSPORT_S = 0.01
 """What no log shows of the time that its lines are under way: part of any latency's sigma."""
 BOOTSTRAP = 400
@@ -82,14 +84,18 @@ def _at_the_end(loop: Loop, step: Step) -> Score:
 def _better(fine: Loop, path: Loop) -> Loop:
     """The loop whose final model drifts less; the fine one where they do alike, or where the other found nothing."""
     drift_fine, drift_path = fine.judged.outage_end_rms_m, path.judged.outage_end_rms_m
-    if not path.steps or drift_fine is None or drift_path is None:
+    if not path.steps or drift_fine is None or drift_path is None or drift_path > BETTER * drift_fine:
         return fine
-    return path if drift_path < BETTER * drift_fine else fine
+    before = path.first_judged.outage_end_rms_m
+    gross = before is not None and drift_path < GROSS * before
+    return path if gross or drift_path < CLEARLY * drift_fine else fine
 
 
 def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> Diagnosis:
     model = loop.model
     sigmas = confounded_sigmas(model)
+    plain = [one.free.effect for one in model.accepted if not one.free.shapes]
+    elsewhere = under_other_trust(model.problems, plain) if model.regime.name == "fine" else {}
     named = [step for step in loop.steps if not isinstance(step.score.effect, Pattern)]
     assert loop.pool is not None
     hidden, detectable, inseparable = excitation(loop.pool, [step.score.effect for step in named])
@@ -97,7 +103,7 @@ def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> D
         runs=tuple(run.name for run in runs),
         vehicle=runs[0].vehicle,
         trust=TRUST[model.regime.name],
-        findings=tuple(_finding(loop, step, sigmas) for step in named),
+        findings=tuple(_finding(loop, step, sigmas, elsewhere) for step in named),
         patterns=tuple(step.score.effect.name for step in loop.steps if isinstance(step.score.effect, Pattern)),
         taken_back=dict(loop.dropped),
         not_excited=tuple(hidden),
@@ -120,7 +126,12 @@ def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> D
     )
 
 
-def _finding(loop: Loop, step: Step, sigmas: dict[tuple[str, str], Floats]) -> Finding:
+def _finding(
+    loop: Loop,
+    step: Step,
+    sigmas: dict[tuple[str, str], Floats],
+    elsewhere: dict[tuple[str, str], tuple[float, float]],
+) -> Finding:
     effect = step.score.effect
     parameters: dict[str, Estimate] = {}
     for values, by_fit, parameter in values_in(loop.model, effect):
@@ -131,6 +142,9 @@ def _finding(loop: Loop, step: Step, sigmas: dict[tuple[str, str], Floats]) -> F
         value = float((weight * values).sum() / weight.sum())
         scatter = float(values.std(ddof=1)) if values.size > 1 else 0.0
         sigma = float(np.hypot(1.0 / np.sqrt(weight.sum()), scatter / np.sqrt(values.size)))
+        if (effect.name, parameter.name) in elsewhere:
+            other, its_sigma = elsewhere[effect.name, parameter.name]
+            sigma = max(sigma, its_sigma, abs(value - other))
         parameters[parameter.name] = Estimate(value, sigma, "estimated", "", None, parameter.prior_sigma)
     for name, value in step.free.shapes.items():
         parameters[name] = Estimate(float(value), float("nan"), "estimated")

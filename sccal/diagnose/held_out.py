@@ -15,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from sccal.align import Timeline
-from sccal.arrays import Bools, Floats
+from sccal.arrays import Floats
 from sccal.calibration.joint import fit_jointly, shared_places
-from sccal.calibration.outage import run_with_outages, summarise
+from sccal.calibration.outage import isolated, run_with_outages, summarise
 from sccal.calibration.result import OutageWindow
 from sccal.diagnose.model import Model, names_of
 from sccal.filter.forward import ForwardPass
@@ -202,7 +202,7 @@ def _judged(
     nll_fix = 0.5 * (np.minimum(d2, 2.0 * CLIP) + np.log(determinant) + 2.0 * np.log(2.0 * np.pi)) / 2.0
     nu, var = out.heading_nu[heading], out.heading_var[heading]
     nll_heading = 0.5 * (np.minimum(nu**2 / var, CLIP) + np.log(2.0 * np.pi * var))
-    inlying = _inlying(e**2 + n**2, d2)
+    inlying = ~isolated(d2 > 2.0 * CLIP, problem.options.recover_count)
     return Judged(
         windows=windows,
         window_s=window_s,
@@ -210,10 +210,3 @@ def _judged(
         heading_rad2=nu**2,
         nll=np.concatenate((np.repeat(nll_fix, 2), nll_heading)),
     )
-
-
-def _inlying(squared: Floats, normalised: Floats) -> Bools:
-    """All but isolated wild fixes: those beyond the gate whose neighbours are not."""
-    wild = normalised > CLIP * 2.0
-    beside = np.concatenate((wild[1:], [False])) | np.concatenate(([False], wild[:-1]))
-    return np.asarray(~wild | beside | (squared <= np.median(squared)))

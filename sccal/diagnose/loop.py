@@ -29,11 +29,17 @@ MANY_SHAPES = 3
 """A few waves of time or place follow anything that changes slowly or from place to place: told, never added."""
 ALIAS_NATS = 3.0
 ALIAS_SHARE = 0.5
+ALIAS_LACK = 0.02
 MAX_FINDINGS = 8
+RIVAL_SHARE, MAX_RIVALS = 0.75, 2
+LEVEL_NATS, LEVEL_SHARE = 5.0, 0.04
+"""Likelihoods this near, in nats or in parts of the gain, do not tell two causes apart."""
 KEPT_T = 3.0
 HINT_NATS, HINT_T, MAX_HINTS = 3.0, 3.5, 3
 MIN_SWALLOWED_NATS = 15.0
 WORSE, MUCH_WORSE = 1.02, 1.15
+MUCH_LIKELIER = 0.01
+"""Nats per measurement."""
 
 
 @dataclass(frozen=True)
@@ -102,10 +108,10 @@ def aliases(pool: Pool, score: Score) -> tuple[str, ...]:
     for other in pool.candidates:
         if other.name == name or isinstance(other, Pattern | Placebo) or not pool.rows(other.name).size:
             continue
-        alone = float(pool.held_out(other.name).sum())
-        if alone < ALIAS_SHARE * score.held_out_nats:
+        if pool.gain(other.name) < ALIAS_SHARE * score.held_out_nats:
             continue
-        if float(pool.held_out(name, other.name).sum()) - alone < ALIAS_NATS:
+        lacking = float(pool.held_out((name, other.name)).sum() - pool.held_out((other.name,), (name,)).sum())
+        if lacking < max(ALIAS_NATS, ALIAS_LACK * score.held_out_nats):
             found.append(other.name)
     return tuple(found)
 
@@ -142,15 +148,52 @@ def run_loop(
             return loop
         else:
             continue
-        grown = refitted(loop.model, (*loop.model.accepted, accepted), {best.effect.name: best.values})
+        if accepted.run is None:
+            best, grown, also = _contest(loop, pool, best, [one for one in ranking if passes(one, least)])
+            accepted = Accepted(Free(best.effect))
+        else:
+            grown, also = _with(loop.model, accepted, best.values), ()
         after = judge(grown, window_s)
         doubt = _doubt(loop.judged, after, grown, best.effect, accepted.run is not None)
         if doubt:
             loop.dropped[best.effect.name] = doubt
             continue
-        also = aliases(pool, best) if accepted.run is None else ()
         loop.steps.append(Step(best, accepted.free, accepted.run, also, tuple(ranking), loop.judged, after))
         loop.model, loop.judged = grown, after
+
+
+def _with(model: Model, accepted: Accepted, values: Floats) -> Model:
+    """The model with one more effect, refitted from first values of its parameters."""
+    return refitted(model, (*model.accepted, accepted), {accepted.free.effect.name: values})
+
+
+def _contest(loop: Loop, pool: Pool, best: Score, passing: Sequence[Score]) -> tuple[Score, Model, tuple[str, ...]]:
+    """The best candidate against those that gain nearly as much, each refitted with the noise estimated anew.
+
+    Scores are linear and the noise is that of a model that lacks the effect; near ties are settled by the whole
+    likelihood. Where that does not tell either, the candidate whose size is least surprising is named, and the others
+    are said to be indistinguishable from it.
+    """
+    rivals = [best]
+    if not isinstance(best.effect, Pattern):
+        near = [one for one in passing if one.held_out_nats > RIVAL_SHARE * best.held_out_nats]
+        rivals += [one for one in near if one is not best and not isinstance(one.effect, Pattern)][:MAX_RIVALS]
+    grown = [_with(loop.model, Accepted(Free(one.effect)), one.values) for one in rivals]
+    if len(rivals) == 1:
+        return best, grown[0], aliases(pool, best)
+    gains = np.array([_nll(loop.model) - _nll(one) for one in grown])
+    most = float(gains.max())
+    level = [k for k in range(len(rivals)) if gains[k] > most - max(LEVEL_NATS, LEVEL_SHARE * most)]
+    surprise = [_surprise(grown[k], rivals[k].effect) for k in level]
+    winner = level[int(np.argmin(surprise))]
+    beside = [rivals[k].effect.name for k in level if k != winner]
+    also = tuple(dict.fromkeys((*beside, *aliases(pool, rivals[winner]))))
+    return rivals[winner], grown[winner], also
+
+
+def _surprise(model: Model, effect: Effect) -> float:
+    """Squared size of an effect's parameters in units of their priors."""
+    return sum(float(np.mean((values / one.prior_sigma) ** 2)) for values, _, one in values_in(model, effect))
 
 
 def _swallowed(
@@ -170,7 +213,7 @@ def _swallowed(
             continue
         tried.add(effect.name)
         accepted = Accepted(Free(effect))
-        grown = refitted(loop.model, (*loop.model.accepted, accepted), {effect.name: score.values})
+        grown = _with(loop.model, accepted, score.values)
         gain = _nll(loop.model) - _nll(grown)
         size, t = size_in(grown, effect)
         if gain < max(MIN_SWALLOWED_NATS, least_nats) or size < 1.0 or t < MIN_T:
@@ -215,9 +258,11 @@ def _doubt(before: Judged, after: Judged, grown: Model, effect: Effect, is_momen
     if not is_moment and before.outage_end_rms_m and after.outage_end_rms_m:
         first_m, then_m = before.outage_end_rms_m, after.outage_end_rms_m
         worse = then_m / first_m
-        less_likely = after.nll_per_measurement > before.nll_per_measurement
+        # Whole runs left out are a hard judge. The few windows of one run are not: there the likelihood has its say.
+        likelier = before.nll_per_measurement - after.nll_per_measurement
         whole_runs = len(grown.problems) >= WHOLE_RUNS
-        if worse > (WORSE if whole_runs or less_likely else MUCH_WORSE):
+        limit = WORSE if whole_runs or likelier < 0.0 else MUCH_WORSE if likelier < MUCH_LIKELIER else np.inf
+        if worse > limit:
             return f"with it the drift without fixes grew from {first_m:.2f} to {then_m:.2f} m"
     return ""
 

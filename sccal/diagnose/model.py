@@ -134,7 +134,24 @@ def extension_of(regime: Regime, accepted: Sequence[Accepted], run: int) -> Free
 
 
 def first_model(runs: Sequence[Aligned], regime: Regime) -> Model:
-    """The paper's model alone."""
+    """The paper's model alone; the time that lines take stays out where it would have to be more than that."""
+    model = _bare(runs, regime)
+    if regime.with_transport and _largest_transport(model) > TRANSPORT.parameters[0].matters:
+        return _bare(runs, replace(regime, with_transport=False))
+    return model
+
+
+def _largest_transport(model: Model) -> float:
+    name = TRANSPORT.effect.name
+    return max(
+        abs(float(theta[3 + place]))
+        for problem, theta in zip(model.problems, model.fit.each, strict=True)
+        for place, one in enumerate(names_of(problem))
+        if one[0] == name
+    )
+
+
+def _bare(runs: Sequence[Aligned], regime: Regime) -> Model:
     problems = []
     for aligned in runs:
         start = find_start(aligned)

@@ -202,7 +202,7 @@ def _ordinary(gains: Floats) -> float:
 
 
 def _peaks(t_s: Floats, squared: Floats, start_s: float, end_s: float) -> Floats:
-    """Times since the start at which innovations are large together, the largest first; single outliers do not count."""
+    """Times since the start at which innovations are large together, the largest first; single outliers apart."""
     if t_s.size < 10:
         return np.zeros(0)
     inside: Bools = (t_s > start_s + EDGE_S) & (t_s < end_s - EDGE_S)

@@ -139,18 +139,34 @@ class Pool:
             loose &= ~beyond
         return values
 
-    def held_out(self, *effects: str) -> Floats:
-        """Gain over the nuisances alone on each part, fitted on all other parts (parts,)."""
-        free, none = self.rows(*effects), np.zeros(0, np.int64)
-        own = any(one.scope == "run" for e in self.candidates if e.name in effects for one in e.parameters)
+    def held_out(self, free: Sequence[str], held: Sequence[str] = ()) -> Floats:
+        """Log-likelihood over that at zero on each part, fitted on all other parts (parts,).
+
+        Some candidates are free, some held at zero, and small amounts of all others are allowed.
+        """
+        loose, still = self.rows(*free), self.rows(*held)
+        own = any(one.scope == "run" for e in self.candidates if e.name in free for one in e.parameters)
         folds = self.time_folds if own else self.folds
         u_all, information_all = sum(u for u, _ in folds), sum(i for _, i in folds)
-        gains = np.zeros(len(folds))
-        for k, (u, information) in enumerate(folds):
-            for chosen, held, sign in ((free, none, 1.0), (none, free, -1.0)):
-                values = self._solve(u_all - u, information_all - information, chosen, held)
-                gains[k] += sign * float(values @ u - 0.5 * values @ information @ values)
-        return gains
+        values = [self._solve(u_all - u, information_all - i, loose, still) for u, i in folds]
+        return np.array([_quadratic(*fold, each) for fold, each in zip(folds, values, strict=True)])
+
+    def gain(self, *effects: str) -> float:
+        """Held-out gain of freeing some candidates, over small amounts of everything."""
+        own = any(one.scope == "run" for e in self.candidates if e.name in effects for one in e.parameters)
+        return float(self.held_out(effects).sum()) - self._small_gain[own]
+
+    @cached_property
+    def _small_gain(self) -> tuple[float, float]:
+        """Held-out gain of small amounts of everything: over the folds, and over those of time."""
+        run_effects = [e.name for e in self.candidates if any(one.scope == "run" for one in e.parameters)]
+        values = []
+        for folds in (self.folds, self.time_folds):
+            u_all, information_all = sum(u for u, _ in folds), sum(i for _, i in folds)
+            none = np.zeros(0, np.int64)
+            each = [(u, i, self._solve(u_all - u, information_all - i, none, none)) for u, i in folds]
+            values.append(float(sum(_quadratic(u, i, v) for u, i, v in each)))
+        return values[0], values[1] if run_effects else values[0]
 
     def score(self, effect: Effect) -> Score:
         """Everything about one candidate."""
@@ -166,10 +182,9 @@ class Pool:
             copies = np.flatnonzero(self.owner[free] == place)
             means.append(float(here[copies].mean()) * self.sigma[place])
             sigmas.append(float(np.sqrt(np.diag(robust)[copies].mean() / copies.size)) * self.sigma[place])
-        without = self._solve(u, information, free[:0], free)
+        without = self._solve(u, information, free[:0], free[:0])
         gain = _quadratic(u, information, values) - _quadratic(u, information, without)
-        held_out = float(self.held_out(effect.name).sum())
-        return Score(effect, gain, held_out, t, np.array(means), np.array(sigmas))
+        return Score(effect, gain, self.gain(effect.name), t, np.array(means), np.array(sigmas))
 
     def everything_free(self) -> Floats:
         """Sigmas (G,) with every parameter free under its whole prior, in units of that prior."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sccal.calibration.result import Calibration, Estimate, Fit, Noise, Parameters, VehicleCalibration
+from sccal.calibration.status import fixes_wander, heading_wanders
 from sccal.report.numbers import short
 from sccal.report.rows import parameter_rows
 
@@ -16,10 +17,6 @@ NIS_HIGH = 3.0
 """Between these the stated noise explains the innovations; outside, every sigma is off by more than about √3."""
 REJECTED_MOST = 0.1
 """Share of measurements that may be rejected before the accepted ones stop being the rule."""
-FIX_WANDER_MOST = 5.0
-"""Correlated fix error over the stated sigma: beyond, it is hardly the receiver that wanders."""
-HEADING_WANDER_MOST_DEG = 3.0
-"""Correlated heading error: beyond, iron near the compass or a wrong clock is likelier than the AHRS itself."""
 CONSISTENCY_HIGH = 3.0
 """χ² per degree of freedom of the runs about the shared parameters."""
 
@@ -108,13 +105,13 @@ def _fit_doubts(fit: Fit) -> list[str]:
 
 def _noise_doubts(noise: Noise) -> list[str]:
     doubts = []
-    if noise.fix_coloured_m > FIX_WANDER_MOST * noise.fix_stated_m:
+    if fixes_wander(noise):
         doubts.append(
             f"fixes wander by {short(noise.fix_coloured_m, 2)} m about the model, stated are "
             f"{short(noise.fix_stated_m, 2)} m: receiver, antenna place or clocks"
         )
-    wander_deg = math.degrees(noise.heading_coloured_rad)
-    if wander_deg > HEADING_WANDER_MOST_DEG:
+    if heading_wanders(noise):
+        wander_deg = math.degrees(noise.heading_coloured_rad)
         doubts.append(
             f"heading wanders by {short(wander_deg, 2)} deg about the model: iron near the compass, or a clock"
         )
