@@ -23,7 +23,7 @@ from sccal.diagnose.confounded import confounded_sigmas, linear_effects
 from sccal.diagnose.excitation import excitation
 from sccal.diagnose.held_out import Judged, how
 from sccal.diagnose.honest import under_other_trust
-from sccal.diagnose.loop import MIN_HELD_OUT_NATS, Loop, Step, is_flexible, passes, run_loop, values_in
+from sccal.diagnose.loop import MIN_HELD_OUT_NATS, Loop, Step, is_flexible, passes, run_loop, values_in, wandering
 from sccal.diagnose.model import Model, Regime, fine_regime, first_model, path_regime
 from sccal.diagnose.picture import picture_of
 from sccal.diagnose.placebo import NAME as NONSENSE
@@ -192,6 +192,8 @@ def _unexplained(loop: Loop) -> Unexplained:
     inside = max(steps, key=lambda step: step.score.held_out_nats, default=None)
     assert loop.pool is not None
     told = next((one for one in loop.pool.ranked() if is_flexible(one.effect) and passes(one, loop.placebo_nats)), None)
+    if inside is None and told is None:
+        told = wandering(loop)
     if inside is None and told is None:
         return Unexplained(False)
     if inside is not None and (told is None or inside.score.held_out_nats >= told.held_out_nats):

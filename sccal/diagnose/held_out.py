@@ -153,7 +153,7 @@ def _on_a_stretch(model: Model, stretch: tuple[float, float], window_s: float) -
     blind = replace(problem, timeline=without(problem.timeline, stretch))
     fit = fit_jointly([blind], [model.at(0)], ROUNDS)
     covariance = fit.runs[0].covariance
-    return _judged(problem, fit.each[0], covariance, stretch, window_s, fit.runs[0].path)
+    return _judged(problem, fit.each[0], covariance, stretch, window_s, model.path(0))
 
 
 def without(timeline: Timeline, stretch: tuple[float, float]) -> Timeline:
@@ -177,6 +177,7 @@ def _judged(
 ) -> Judged:
     """Run the filter over the whole run from the given constants, and look at the stretch.
 
+    The path only says where the robot headed, for effects that depend on it; a blind fit's path would not know.
     ``offset`` is what other runs say of the heading offset: mean (rad) and variance (rad²).
     """
     at = At(Constants.of(theta), theta[3:], path if problem.extra else None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from sccal.diagnose.moments import Moment, find_moments
 from sccal.diagnose.placebo import Placebo
 from sccal.diagnose.pool import WHOLE_RUNS, Pool, Score
 from sccal.effects.effect import Effect, Parameter
-from sccal.effects.patterns import Pattern
+from sccal.effects.patterns import PATTERNS, Pattern
 
 MIN_HELD_OUT_NATS = 8.0
 MIN_T = 4.5
@@ -37,6 +37,8 @@ LEVEL_NATS, LEVEL_SHARE = 5.0, 0.04
 KEPT_T = 3.0
 HINT_NATS, HINT_T, MAX_HINTS = 3.0, 3.5, 3
 MIN_SWALLOWED_NATS = 15.0
+WANDERING_RAD = np.radians(1.0)
+MIN_WANDER_NATS, MIN_WANDER_T, MOST_LEFT = 3.0, 6.0, 0.5
 WORSE, MUCH_WORSE = 1.02, 1.15
 MUCH_LIKELIER = 0.01
 """Nats per measurement."""
@@ -160,6 +162,26 @@ def run_loop(
             continue
         loop.steps.append(Step(best, accepted.free, accepted.run, also, tuple(ranking), loop.judged, after))
         loop.model, loop.judged = grown, after
+        _prune(loop, window_s)
+
+
+def _prune(loop: Loop, window_s: float) -> None:
+    """Take out what a later finding has made unnecessary: a drift, once the step is in that it had to imitate."""
+    newest = loop.steps[-1].score.effect.name
+    for step in loop.steps[:-1]:
+        effect = step.score.effect
+        size, t = size_in(loop.model, effect)
+        if size >= 1.0 and t >= KEPT_T:
+            continue
+        kept = tuple(one for one in loop.model.accepted if one.free.effect.name != effect.name)
+        loop.model = refitted(loop.model, kept, {})
+        loop.judged = judge(loop.model, window_s)
+        loop.dropped[effect.name] = f"with {newest} in the model nothing of it is left ({t:.1f} of its sigma)"
+        loop.steps = [one for one in loop.steps if one.score.effect.name != effect.name]
+        # The first of the remaining steps starts where the model did.
+        loop.steps = [replace(one, before=loop.first_judged) if k == 0 else one for k, one in enumerate(loop.steps)]
+        loop.steps[-1] = replace(loop.steps[-1], after=loop.judged)
+        return
 
 
 def _with(model: Model, accepted: Accepted, values: Floats) -> Model:
@@ -228,6 +250,32 @@ def _swallowed(
         loop.model, loop.judged = grown, after
         return True
     return False
+
+
+def wandering(loop: Loop) -> Score | None:
+    """The pattern of time or place that a heading's large slow error follows, if it follows one.
+
+    Such an error is noise to the filter, and a pattern with few bends against noise with the same bends looks like
+    nothing. With the noise estimated anew beside the pattern, it is one or the other.
+    """
+    model = loop.model
+    if max(problem.noise.heading_coloured_rad for problem in model.problems) < WANDERING_RAD:
+        return None
+    found: list[Score] = []
+    for pattern in PATTERNS:
+        if pattern.port != "heading" or not is_flexible(pattern):
+            continue
+        grown = _with(model, Accepted(Free(pattern)), np.zeros(len(pattern.parameters)))
+        gain = _nll(model) - _nll(grown)
+        size, t = size_in(grown, pattern)
+        was, left = (
+            np.mean([problem.noise.heading_coloured_rad**2 for problem in one.problems]) for one in (model, grown)
+        )
+        if gain >= MIN_WANDER_NATS and t >= MIN_WANDER_T and size >= 1.0 and left < MOST_LEFT * was:
+            values = np.array([float(v.mean()) for v, _, _ in values_in(grown, pattern)])
+            sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, pattern)])
+            found.append(Score(pattern, gain, gain, t, values, sigmas))
+    return max(found, key=lambda one: one.gain_nats, default=None)
 
 
 def _nll(model: Model) -> float:

@@ -152,7 +152,7 @@ def _settled(whole: RunProblem, rough: Moment, scan: _Scan) -> Moment:
     index = timeline.heading_index if rough.free.effect.name == "heading_step" else timeline.fix_index
     of = whole.aligned.heading_t_s if rough.free.effect.name == "heading_step" else whole.aligned.fix_t_s
     t_s = of[index] - whole.aligned.span_s[0]
-    near = t_s[np.abs(t_s - rough.free.shapes["at_s"]) < 0.5 / HEADING_HZ + 0.5 / FIX_HZ]
+    near = t_s[np.abs(t_s - rough.free.shapes["at_s"]) < 2.0 / FIX_HZ]
     if near.size < 2:
         return rough
     fine = _Scan(whole, scan.at, timeline)

@@ -88,7 +88,7 @@ def _heading_patterns() -> list[Pattern]:
         heading("turn rate (size)", lambda d: [np.abs(d.headings.turn_rate_radps)], 1),
         heading("side of the last turn", lambda d: [_last_turn(d.headings.turn_rate_radps)], 1),
         heading("acceleration", lambda d: [d.headings.acceleration_mps2], 1),
-        heading("time", lambda d: _waves(d, d.headings.t_s, 4), 4),
+        heading("time", lambda d: _waves(d, d.headings.t_s, 6), 6),
         heading("place", lambda d: _place(d.headings.east_m, d.headings.north_m, 2), 5),
     ]
 
