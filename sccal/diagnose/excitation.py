@@ -13,6 +13,7 @@ from sccal.diagnose.placebo import Placebo
 from sccal.diagnose.pool import Pool
 from sccal.diagnose.result import Detectable, Inseparable, NotExcited
 from sccal.effects.effect import Effect
+from sccal.effects.logged import LoggedColumn
 from sccal.effects.patterns import Pattern
 
 SAME = 0.98
@@ -37,7 +38,7 @@ def excitation(pool: Pool, found: Sequence[Effect]) -> tuple[list[NotExcited], l
         smallest = {one.name: float(size) for one, size in zip(parameters, least, strict=True)}
         units = {one.name: one.unit for one in parameters}
         shown.append((effect, Detectable(effect.name, effect.title, smallest, units)))
-    return hidden, [one for _, one in shown], _sets(pool, [effect for effect, _ in shown])
+    return hidden, [one for _, one in shown], _sets(pool, [effect for effect, _ in shown if not isinstance(effect, LoggedColumn)])
 
 
 def _sets(pool: Pool, effects: Sequence[Effect]) -> list[Inseparable]:

@@ -20,6 +20,7 @@ from sccal.calibration.joint import fit_jointly, shared_places
 from sccal.calibration.outage import isolated, run_with_outages, summarise
 from sccal.calibration.result import OutageWindow
 from sccal.diagnose.model import Model, names_of
+from sccal.diagnose.parallel import each
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
@@ -69,9 +70,9 @@ class Judged:
 def judge(model: Model, window_s: float) -> Judged:
     """Hold out every run, or every stretch of the only one, in its turn."""
     if len(model.problems) > 1:
-        parts = [_on_others(model, run, window_s) for run in range(len(model.problems))]
+        parts = each(lambda run: _on_others(model, run, window_s), range(len(model.problems)))
     else:
-        parts = [_on_a_stretch(model, stretch, window_s) for stretch in stretches(model.problems[0])]
+        parts = each(lambda stretch: _on_a_stretch(model, stretch, window_s), stretches(model.problems[0]))
     return Judged(
         windows=tuple(window for part in parts for window in part.windows),
         window_s=window_s,

@@ -13,6 +13,7 @@ from sccal.diagnose.evidence import Evidence, gather
 from sccal.diagnose.held_out import Judged, judge
 from sccal.diagnose.model import Accepted, Model, names_of, refitted, without_transport
 from sccal.diagnose.moments import Moment, find_moments
+from sccal.diagnose.parallel import each
 from sccal.diagnose.placebo import Placebo
 from sccal.diagnose.pool import WHOLE_RUNS, Pool, Score
 from sccal.effects.effect import Effect, Parameter
@@ -71,13 +72,14 @@ class Loop:
     pool: Pool | None = None
     """The evidence when nothing passed any more."""
     placebo_nats: float = 0.0
-    """Largest held-out gain of a nonsense column, in any round."""
+    """Largest held-out gain of a nonsense column in the last round, and how many passed the test there."""
     placebos_passed: int = 0
 
 
 def evidence_of(model: Model, candidates: Sequence[Effect]) -> list[Evidence]:
     """One scoring pass per run; the time that lines take is held at zero there, for it is a candidate itself."""
-    return [gather(*without_transport(problem, model.at(k)), candidates) for k, problem in enumerate(model.problems)]
+    runs = range(len(model.problems))
+    return each(lambda k: gather(*without_transport(model.problems[k], model.at(k)), candidates), runs)
 
 
 def passes(score: Score, least_nats: float = 0.0) -> bool:
@@ -133,9 +135,8 @@ def run_loop(
         left = [effect for effect in candidates if effect.name not in inside | set(loop.dropped)]
         pool = loop.pool = Pool(evidence_of(loop.model, left), left)
         placebos = pool.placebos()
-        loop.placebos_passed += sum(passes(one) for one in placebos)
-        least = max((one.held_out_nats for one in placebos), default=0.0)
-        loop.placebo_nats = max(loop.placebo_nats, least)
+        loop.placebos_passed = sum(passes(one) for one in placebos)
+        least = loop.placebo_nats = max((one.held_out_nats for one in placebos), default=0.0)
         ranking = pool.ranked()
         best = chosen(ranking, least)
         moment = _best_moment(loop) if with_moments else None
@@ -245,7 +246,7 @@ def _swallowed(
             continue
         values = np.array([float(v.mean()) for v, _, _ in values_in(grown, effect)])
         sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, effect)])
-        found = Score(effect, gain, gain, t, values, sigmas)
+        found = Score(effect, gain, gain, t, values, sigmas, size)
         loop.steps.append(Step(found, accepted.free, None, (), tuple(ranking), loop.judged, after))
         loop.model, loop.judged = grown, after
         return True
@@ -274,7 +275,7 @@ def wandering(loop: Loop) -> Score | None:
         if gain >= MIN_WANDER_NATS and t >= MIN_WANDER_T and size >= 1.0 and left < MOST_LEFT * was:
             values = np.array([float(v.mean()) for v, _, _ in values_in(grown, pattern)])
             sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, pattern)])
-            found.append(Score(pattern, gain, gain, t, values, sigmas))
+            found.append(Score(pattern, gain, gain, t, values, sigmas, size))
     return max(found, key=lambda one: one.gain_nats, default=None)
 
 
@@ -285,17 +286,20 @@ def _nll(model: Model) -> float:
 
 def _best_moment(loop: Loop) -> Moment | None:
     """The moment or place that stands out most in any run."""
-    found: list[Moment] = []
-    for run in range(len(loop.model.problems)):
+
+    def of_run(run: int) -> list[Moment]:
         known = [one.free.effect.name for one in loop.model.accepted if one.run == run]
-        found += find_moments(loop.model, run, [*known, *loop.dropped])
+        return find_moments(loop.model, run, [*known, *loop.dropped])
+
+    of_runs = each(of_run, range(len(loop.model.problems)))
+    found = [one for several in of_runs for one in several]
     good = [one for one in found if one.gain_nats >= MIN_HELD_OUT_NATS and one.t >= MIN_MOMENT_T and one.size >= 1.0]
     return max(good, key=lambda one: one.gain_nats, default=None)
 
 
 def _as_score(moment: Moment) -> Score:
     gain = moment.gain_nats
-    return Score(moment.free.effect, gain, gain, moment.t, moment.values, moment.sigmas)
+    return Score(moment.free.effect, gain, gain, moment.t, moment.values, moment.sigmas, moment.size)
 
 
 def _doubt(before: Judged, after: Judged, grown: Model, effect: Effect, is_moment: bool) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.calibration.extension import Free, FreeEffects
 from sccal.calibration.joint import JointFit, fit_jointly
+from sccal.diagnose.parallel import each
 from sccal.effects.catalogue import effect_named
 from sccal.filter.forward import ForwardPass, Noise
 from sccal.filter.iterate import At, RunProblem, iterate
@@ -153,23 +154,24 @@ def _largest_transport(model: Model) -> float:
 
 
 def _bare(runs: Sequence[Aligned], regime: Regime) -> Model:
-    problems = []
-    for aligned in runs:
+    def prepared(aligned: Aligned) -> tuple[RunProblem, At]:
         start = find_start(aligned)
         extension = extension_of(regime, (), 0)
         noise = regime.noise_of(aligned, start, extension, None)
-        problems.append(RunProblem(aligned, regime.timeline(aligned), start, noise, regime.options, extension))
-    firsts = []
-    for problem in problems:
+        problem = RunProblem(aligned, regime.timeline(aligned), start, noise, regime.options, extension)
         values, found = iterate(problem, problem.at_centre())
-        firsts.append(At(Constants.of(values), values[4:], found))
-    return Model(regime, (), tuple(problems), fit_jointly(problems, firsts, ROUNDS))
+        return problem, At(Constants.of(values), values[4:], found)
+
+    ready = each(prepared, runs)
+    problems = [problem for problem, _ in ready]
+    return Model(regime, (), tuple(problems), fit_jointly(problems, [first for _, first in ready], ROUNDS))
 
 
 def refitted(model: Model, accepted: Sequence[Accepted], hints: dict[str, np.ndarray], new_noise: bool = True) -> Model:
     """The same runs with other effects, noise and fit anew; hints are first values (m,) of effects not yet in."""
-    problems, firsts = [], []
-    for k, before in enumerate(model.problems):
+
+    def prepared(k: int) -> tuple[RunProblem, At]:
+        before = model.problems[k]
         extension = extension_of(model.regime, accepted, k)
         first = _carried(model, k, extension, hints)
         problem = replace(before, extension=extension)
@@ -178,9 +180,12 @@ def refitted(model: Model, accepted: Sequence[Accepted], hints: dict[str, np.nda
             values, found = iterate(problem, first, 3)
             near = At(Constants.of(values), values[4:], found)
             problem = replace(problem, noise=model.regime.noise_of(before.aligned, before.start, extension, near))
-        problems.append(problem)
-        firsts.append(first)
-    return Model(model.regime, tuple(accepted), tuple(problems), fit_jointly(problems, firsts, ROUNDS))
+        return problem, first
+
+    ready = each(prepared, range(len(model.problems)))
+    problems = [problem for problem, _ in ready]
+    fit = fit_jointly(problems, [first for _, first in ready], ROUNDS)
+    return Model(model.regime, tuple(accepted), tuple(problems), fit)
 
 
 def _carried(model: Model, run: int, extension: FreeEffects | None, hints: dict[str, np.ndarray]) -> At:

@@ -45,12 +45,8 @@ class Score:
     """(m,) one-step estimate in file units; of a run's parameter, the mean over the runs."""
     sigmas: Floats
     """(m,) block-robust."""
-
-    @property
-    def size(self) -> float:
-        """Largest parameter in units of the smallest size that matters."""
-        least = np.array([one.matters for one in Free(self.effect).parameters])
-        return float(np.max(np.abs(self.values) / np.maximum(least, 1e-12)))
+    size: float
+    """Largest parameter in units of the smallest size that matters; of a run's parameter, the rms over the runs."""
 
 
 class Pool:
@@ -177,14 +173,16 @@ class Pool:
         here = values[free]
         chi2 = float(here @ np.linalg.lstsq(robust + 1e-12 * np.eye(free.size), here, rcond=None)[0])
         t = float(np.sqrt(max(chi2 - (free.size - 1), 0.0)))
-        means, sigmas = [], []
-        for place in self.local[effect.name]:
+        means, sigmas, sizes = [], [], []
+        for place, parameter in zip(self.local[effect.name], Free(effect).parameters, strict=True):
             copies = np.flatnonzero(self.owner[free] == place)
+            typical = float(np.sqrt(np.mean(here[copies] ** 2))) * self.sigma[place]
+            sizes.append(typical / max(parameter.matters, 1e-12))
             means.append(float(here[copies].mean()) * self.sigma[place])
             sigmas.append(float(np.sqrt(np.diag(robust)[copies].mean() / copies.size)) * self.sigma[place])
         without = self._solve(u, information, free[:0], free[:0])
         gain = _quadratic(u, information, values) - _quadratic(u, information, without)
-        return Score(effect, gain, self.gain(effect.name), t, np.array(means), np.array(sigmas))
+        return Score(effect, gain, self.gain(effect.name), t, np.array(means), np.array(sigmas), max(sizes))
 
     def everything_free(self) -> Floats:
         """Sigmas (G,) with every parameter free under its whole prior, in units of that prior."""
