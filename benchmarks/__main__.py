@@ -80,6 +80,10 @@ def main() -> None:
         whole = timed(lambda: subprocess.run(command, check=True, capture_output=True), 3)
         peak_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
         show("sccal calibrate, the whole process", whole, f"{peak_mb:.0f} MB at most")
+        command[3] = "diagnose"
+        whole = timed(lambda: subprocess.run(command, check=True, capture_output=True), 1)
+        peak_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        show("sccal diagnose, the whole process", whole, f"{peak_mb:.0f} MB at most")
         help_command = [sys.executable, "-m", "sccal", "--help"]
         show("sccal --help", timed(lambda: subprocess.run(help_command, check=True, capture_output=True)))
     seconds, ratio = kernel_against_oracle()
