@@ -39,8 +39,9 @@ from sccal.effects.patterns import PATTERNS, Pattern
 
 BETTER, CLEARLY, GROSS = 0.98, 0.75, 0.6
 """Shares of a drift: hardly better, clearly better, and what only an effect beyond all noise can bring about."""
-TRANSPORT_S = 0.01
+TRANSPORT_S = 0.02
 """What no log shows of the time that its lines are under way: part of any latency's sigma."""
+SECOND_ORDER = 1.5
 BOOTSTRAP = 400
 RANKED = 8
 TRUST = {
@@ -96,7 +97,7 @@ def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> D
     sigmas = confounded_sigmas(model)
     plain = [one.free.effect for one in model.accepted if not one.free.shapes]
     elsewhere = under_other_trust(model.problems, plain) if model.regime.name == "fine" else {}
-    named = [step for step in loop.steps if not isinstance(step.score.effect, Pattern)]
+    named = [s for s in loop.steps if not isinstance(s.score.effect, Pattern) and not _is_second_order(loop, s)]
     assert loop.pool is not None
     hidden, detectable, inseparable = excitation(loop.pool, [step.score.effect for step in named])
     return Diagnosis(
@@ -104,7 +105,7 @@ def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> D
         vehicle=runs[0].vehicle,
         trust=TRUST[model.regime.name],
         findings=tuple(_finding(loop, step, sigmas, elsewhere) for step in named),
-        patterns=tuple(step.score.effect.name for step in loop.steps if isinstance(step.score.effect, Pattern)),
+        patterns=tuple(step.score.effect.name for step in loop.steps if step not in named),
         taken_back=dict(loop.dropped),
         not_excited=tuple(hidden),
         detectable=tuple(detectable),
@@ -136,6 +137,9 @@ def _finding(
     parameters: dict[str, Estimate] = {}
     for values, by_fit, parameter in values_in(loop.model, effect):
         honest = np.maximum(by_fit, sigmas.get((effect.name, parameter.name), by_fit))
+        if step.free.shapes:
+            place = [one.name for one in step.free.parameters].index(parameter.name)
+            honest = np.maximum(honest, step.score.sigmas[place])
         if effect.name == "gnss_latency":
             honest = np.hypot(honest, TRANSPORT_S)
         weight = 1.0 / honest**2
@@ -147,7 +151,7 @@ def _finding(
             sigma = max(sigma, its_sigma, abs(value - other))
         parameters[parameter.name] = Estimate(value, sigma, "estimated", "", None, parameter.prior_sigma)
     for name, value in step.free.shapes.items():
-        parameters[name] = Estimate(float(value), float("nan"), "estimated")
+        parameters[name] = Estimate(float(value), step.shape_sigmas.get(name, float("nan")), "estimated")
     units = {one.name: one.unit for one in effect.parameters}
     advice = ""
     if step.indistinguishable_from:
@@ -168,6 +172,24 @@ def _finding(
         drift_after_m=step.after.outage_end_rms_m,
         picture=_picture(loop, step),
     )
+
+
+def _is_second_order(loop: Loop, step: Step) -> bool:
+    """Whether a second harmonic of the heading is only what a first one of its size brings along.
+
+    A hard iron of A radians has a second harmonic of A²/2 by the compass's geometry, and none where its error is sine and
+    cosine alone. The model keeps it either way; it is no second cause.
+    """
+    if step.score.effect.name != "soft_iron":
+        return False
+    first, second = (_amplitude_rad(loop.model, name) for name in ("hard_iron", "soft_iron"))
+    return bool(second < SECOND_ORDER * 0.5 * first**2)
+
+
+def _amplitude_rad(model: Model, name: str) -> float:
+    """Of a deviation of the compass, 0 where the model has none."""
+    degrees = [float(each.mean()) for each, _, _ in values_in(model, CATALOGUE[name])]
+    return float(np.radians(np.linalg.norm(degrees))) if degrees else 0.0
 
 
 def _with(ranking: Sequence[Score], score: Score) -> list[Score]:

@@ -38,7 +38,11 @@ def excitation(pool: Pool, found: Sequence[Effect]) -> tuple[list[NotExcited], l
         smallest = {one.name: float(size) for one, size in zip(parameters, least, strict=True)}
         units = {one.name: one.unit for one in parameters}
         shown.append((effect, Detectable(effect.name, effect.title, smallest, units)))
-    return hidden, [one for _, one in shown], _sets(pool, [effect for effect, _ in shown if not isinstance(effect, LoggedColumn)])
+    return (
+        hidden,
+        [one for _, one in shown],
+        _sets(pool, [effect for effect, _ in shown if not isinstance(effect, LoggedColumn)]),
+    )
 
 
 def _sets(pool: Pool, effects: Sequence[Effect]) -> list[Inseparable]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -56,6 +56,7 @@ class Step:
     ranking: tuple[Score, ...]
     before: Judged
     after: Judged
+    shape_sigmas: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -161,7 +162,8 @@ def run_loop(
         if doubt:
             loop.dropped[best.effect.name] = doubt
             continue
-        loop.steps.append(Step(best, accepted.free, accepted.run, also, tuple(ranking), loop.judged, after))
+        shapes = moment.shape_sigmas if moment is not None and accepted.run is not None else {}
+        loop.steps.append(Step(best, accepted.free, accepted.run, also, tuple(ranking), loop.judged, after, shapes))
         loop.model, loop.judged = grown, after
         _prune(loop, window_s)
 

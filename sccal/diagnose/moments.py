@@ -9,7 +9,7 @@ innovations are large together, and a grid. Gates are soft: an outlier can win n
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,6 +35,7 @@ ZOOMS, POINTS = 3, 7
 ANY_SIZE = 5.0
 """Factor on the priors: a jump that the filter thinks impossible would be taken for outliers."""
 RADII_M = (1.5, 3.0, 6.0)
+PLACE_RADII = 1.0
 LOOKED_ELSEWHERE_NATS = 10.0
 """Price of having tried hundreds of moments, and of the moment itself."""
 ORDINARY = 3.0
@@ -52,11 +53,10 @@ class Moment:
     sigmas: Floats
     gain_nats: float
     """In log-likelihood, less the price of the search."""
-
-    @property
-    def t(self) -> float:
-        """Size over its error."""
-        return float(np.max(np.abs(self.values) / self.sigmas))
+    t: float
+    """Size over its error, the moment or place as found."""
+    shape_sigmas: Mapping[str, float] = field(default_factory=dict)
+    """Of the place and its size; a moment is known to the reading."""
 
     @property
     def size(self) -> float:
@@ -159,7 +159,8 @@ def _settled(whole: RunProblem, rough: Moment, scan: _Scan) -> Moment:
     between = 0.5 * (near[1:] + near[:-1])
     best, _ = fine.best(rough.free.effect, [{"at_s": float(s)} for s in between[:: max(between.size // 24, 1)]])
     _, values, sigmas = fine.trial(rough.free.effect, best)
-    return replace(rough, free=replace(rough.free, shapes=dict(best)), values=values, sigmas=sigmas)
+    t = float(np.max(np.abs(values) / sigmas))
+    return replace(rough, free=replace(rough.free, shapes=dict(best)), values=values, sigmas=sigmas, t=t)
 
 
 def _search_place(scan: _Scan, run: int, effect: Effect, suspects: Floats, grid: Floats) -> list[Moment]:
@@ -187,13 +188,49 @@ def _search_place(scan: _Scan, run: int, effect: Effect, suspects: Floats, grid:
         best, _ = scan.best(effect, [{**best, "radius_m": best["radius_m"] * k} for k in (0.7, 0.85, 1.0, 1.2, 1.4)])
         if best == before:
             step *= 0.5
-    return _moment(scan, run, effect, best, _ordinary(usual))
+    return [_with_place_errors(scan, one) for one in _moment(scan, run, effect, best, _ordinary(usual))]
+
+
+def _with_place_errors(scan: _Scan, found: Moment) -> Moment:
+    """Sigmas of the place and its size from the curvature of the likelihood, and what they do to the effect's size.
+
+    A robot that passes a place once on a straight line sees neither on which side it lies nor how far off: a weak field
+    nearby and a strong one further away are the same to it.
+    """
+    names = ("east_m", "north_m", "radius_m")
+    radius = found.free.shapes["radius_m"]
+    steps = np.array([0.3, 0.3, 0.2]) * radius
+
+    def at(offset: Floats) -> tuple[float, Floats]:
+        shapes = {name: found.free.shapes[name] + float(d) for name, d in zip(names, offset, strict=True)}
+        gain, values, _ = scan.trial(found.free.effect, shapes)
+        return gain, values
+
+    units = np.diag(steps)
+    here, _ = at(np.zeros(3))
+    curvature = np.zeros((3, 3))
+    slopes = np.zeros((3, found.values.size))
+    for i in range(3):
+        (up, more), (down, less) = at(units[i]), at(-units[i])
+        curvature[i, i] = -(up - 2.0 * here + down) / steps[i] ** 2
+        slopes[i] = (more - less) / (2.0 * steps[i])
+        for j in range(i):
+            crossed = [at(a * units[i] + b * units[j])[0] * a * b for a in (1.0, -1.0) for b in (1.0, -1.0)]
+            curvature[i, j] = curvature[j, i] = -sum(crossed) / (4.0 * steps[i] * steps[j])
+    # Known no better than to a few radii in any direction, which also keeps a flat or saddled likelihood in hand.
+    values, vectors = np.linalg.eigh(curvature)
+    least = 1.0 / (PLACE_RADII * radius) ** 2
+    covariance = vectors @ np.diag(1.0 / np.maximum(values, least)) @ vectors.T
+    sigmas = np.sqrt(found.sigmas**2 + np.einsum("ik,ij,jk->k", slopes, covariance, slopes))
+    of_place = {name: float(sigma) for name, sigma in zip(names, np.sqrt(np.diag(covariance)), strict=True)}
+    return replace(found, sigmas=sigmas, shape_sigmas=of_place)
 
 
 def _moment(scan: _Scan, run: int, effect: Effect, shapes: Mapping[str, float], ordinary: float) -> list[Moment]:
     gain, values, sigmas = scan.trial(effect, shapes)
     gain -= LOOKED_ELSEWHERE_NATS + ORDINARY * ordinary
-    return [Moment(run, Free(effect, dict(shapes), ANY_SIZE), values, sigmas, gain)] if gain > 0.0 else []
+    t = float(np.max(np.abs(values) / sigmas))
+    return [Moment(run, Free(effect, dict(shapes), ANY_SIZE), values, sigmas, gain, t)] if gain > 0.0 else []
 
 
 def _ordinary(gains: Floats) -> float:

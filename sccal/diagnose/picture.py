@@ -27,6 +27,8 @@ LEAST = 3
 MOTION_WINDOW_S = 5.0
 STANDING_MPS = 0.05
 NORMAL_MAD = 1.4826
+UNSURE = 5.0
+"""Bins whose error is so many times the usual are not drawn: they would only stretch the axis."""
 
 Quantity = Callable[[DriveView, Moments], Floats]
 
@@ -267,4 +269,7 @@ def _binned(x_label: str, y_label: str, x: Floats, was: Floats, is_now: Floats, 
         spread = [float(np.median(np.abs(values[row] - np.median(values[row])))) for row in rows]
         return np.array([NORMAL_MAD * one / np.sqrt(row.size) for one, row in zip(spread, rows, strict=True)])
 
+    errors = error(was)
+    known = errors <= UNSURE * float(np.median(errors))
+    rows = [row for row, good in zip(rows, known, strict=True) if good]
     return Picture(x_label, y_label, mean(x), mean(was), error(was), mean(is_now), error(is_now), mean(model))

@@ -50,7 +50,7 @@ class GnssLatency(Effect):
 
     name = "gnss_latency"
     title = "fixes that show an earlier place than their stamp says"
-    parameters = (Parameter("s", "s", 0.2, -2.0, 2.0, "run", matters=0.04),)
+    parameters = (Parameter("s", "s", 0.2, -2.0, 2.0, "run", matters=0.07),)
     looks_like = "fixes lag behind the path in proportion to speed, and run ahead of it in reverse"
     excited_by = "drive at a second speed, or reverse 10 m: at one speed it is the same as a forward lever arm"
     reference = "Skog and Händel 2011, Time synchronization errors in loosely coupled GPS-aided inertial navigation"

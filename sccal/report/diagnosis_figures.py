@@ -63,8 +63,8 @@ def finding_drawings(d: Diagnosis, number: int) -> tuple[Drawing, ...]:
             Drawing(
                 f"candidates-{number + 1}",
                 "What each candidate, alone, gains on data that did not fit it. Blue is the one that was added, light "
-                "blue are other effects, grey are patterns without a name. Left of the dashed line is what chance "
-                "can do in this log.",
+                "blue are other effects, grey are patterns without a name. The dashed line is what a finding needs, "
+                "at least, in this log.",
                 candidates(finding, d.placebo.needed_nats),
             )
         )
@@ -123,10 +123,7 @@ def residual_picture(picture: Picture, titles: tuple[str, str] = ("without the e
 
 def drift_before_after(before: Judgement, after: Judgement | None) -> str:
     """Each window's drift since it began, and the root mean square over the windows; one model if nothing changed."""
-    if after is None:
-        models = [(before, BLUE, "as it is")]
-    else:
-        models = [(before, VERMILION, "before"), (after, BLUE, "after")]
+    models = [(before, BLUE, "as it is")] if after is None else [(before, VERMILION, "before"), (after, BLUE, "after")]
     with _styled("drift before after"):
         figure = Figure(figsize=(_NARROW_IN, 3.9))
         axes = figure.add_axes((0.13, 0.125, 0.84, 0.76))
@@ -158,26 +155,29 @@ def candidates(finding: Finding, needed_nats: float) -> str:
         shown = [*shown[: RANKED_SHOWN - 1], *(one for one in finding.ranking if one.name == finding.name)]
     gains = [one.held_out_gain_nats if math.isfinite(one.held_out_gain_nats) else 0.0 for one in shown]
     with _styled("candidates"):
-        height = 0.6 + 0.42 * len(shown)
+        height = 0.6 + 0.46 * len(shown)
         figure = Figure(figsize=(_NARROW_IN, height))
         axes = figure.add_axes((0.03, 0.45 / height, 0.94, 1.0 - 0.5 / height))
         places = np.arange(len(shown))
-        axes.barh(places, gains, height=0.36, color=[_colour(one, finding.name) for one in shown])
+        axes.barh(places, gains, height=0.34, color=[_colour(one, finding.name) for one in shown], zorder=2)
         span = max(*gains, 0.0) - min(*gains, 0.0) or 1.0
+        if math.isfinite(needed_nats) and 0.0 < needed_nats < 1.2 * span:
+            axes.axvline(needed_nats, color=VERMILION, lw=1.0, ls=(0, (4, 3)), zorder=1)
+        paper = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
         for place, one, gain in zip(places, shown, gains, strict=True):
             chosen = one.name == finding.name
             axes.annotate(
-                _bar_label(one), (0.0, place - 0.2), (2, 1.5), textcoords="offset points", va="bottom", ha="left",
+                _bar_label(one), (0.0, place - 0.2), (2, 3), textcoords="offset points", va="bottom", ha="left",
                 color=BLACK if one.named else "#666666", fontsize=8.0, fontweight="bold" if chosen else "normal",
+                bbox=paper, zorder=4,
             )  # fmt: skip
+            end = max(gain, needed_nats if 0.0 < needed_nats < 0.1 * span and gain < needed_nats else 0.0)
             axes.annotate(
-                plain(one.held_out_gain_nats, 3 if abs(gain) >= 100.0 else 2), (max(gain, 0.0), place),
-                (4, 0), textcoords="offset points", va="center", fontsize=8.0,
+                plain(one.held_out_gain_nats, 3 if abs(gain) >= 100.0 else 2), (end, place),
+                (4, 0), textcoords="offset points", va="center", fontsize=8.0, zorder=4,
             )  # fmt: skip
-        if math.isfinite(needed_nats) and 0.0 < needed_nats < 1.2 * span:
-            axes.axvline(needed_nats, color=VERMILION, lw=1.0, ls=(0, (4, 3)), zorder=3)
         axes.set_xlim(min(*gains, 0.0) - 0.02 * span, max(*gains, 0.0) + 0.14 * span)
-        axes.set_ylim(len(shown) - 0.6, -0.75)
+        axes.set_ylim(len(shown) - 0.65, -0.8)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         axes.grid(axis="y", visible=False)

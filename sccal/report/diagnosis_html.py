@@ -28,8 +28,9 @@ from sccal.report.html import _page
 from sccal.report.numbers import one_line, plain, short
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.summary import warnings_first
+from sccal.report.text import _NUMBER_AND_UNIT, shortened
 
-RUNS_LISTED = 8
+RUNS_LISTED = 6
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,6 @@ class Step:
     title: str
     clause: str
     looks_like: str
-    reference: str
     rows: tuple[Row, ...]
     drawings: tuple[Drawing, ...]
     facts: tuple[tuple[str, str], ...]
@@ -103,7 +103,7 @@ def _headline(d: Diagnosis) -> Headline:
         doubts = [_sentence(doubt) for finding in d.findings if (doubt := doubt_sentence(finding))]
         left = [_sentence(f"Left without a name: {unexplained_sentence(d.unexplained)}")]
         if count == 1:
-            clauses = [_sentence(verdict_sentence(d))]
+            clauses = [_sentence(f"{cause_clause(d.findings[0])}: {brings_clause(d)}")]
         else:
             clauses.append(_sentence(brings_clause(d)))
         return Headline(level, (*clauses, *doubts, *(left if d.unexplained.significant else [])))
@@ -121,7 +121,6 @@ def _step(d: Diagnosis, number: int) -> Step:
         title=_sentence(finding.title, stop=False),
         clause=_sentence(cause_clause(finding)),
         looks_like=_sentence(known.looks_like) if known else "",
-        reference=finding.reference,
         rows=finding_rows(finding),
         drawings=finding_drawings(d, number),
         facts=_evidence(d, finding),
@@ -151,7 +150,7 @@ def _alternative(d: Diagnosis, finding: Finding) -> tuple[str, list[Named], str]
 
 
 def _runs(d: Diagnosis) -> str:
-    names = ", ".join(one_line(run) for run in d.runs[:RUNS_LISTED])
+    names = ", ".join(shortened(one_line(run), 40) for run in d.runs[:RUNS_LISTED])
     more = f" and {len(d.runs) - RUNS_LISTED} more" if len(d.runs) > RUNS_LISTED else ""
     return f"{len(d.runs)} run{'' if len(d.runs) == 1 else 's'}: {names}{more}"
 
@@ -176,4 +175,5 @@ def _sentence(text: str, stop: bool = True) -> str:
     first = text.partition(" ")[0]
     if text and "_" not in first and "~" not in first:
         text = text[0].upper() + text[1:]
+    text = _NUMBER_AND_UNIT.sub("\\1\u00a0", text)
     return text if not stop or not text or text[-1] in ".!?…" else f"{text}."

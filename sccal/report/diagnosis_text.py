@@ -67,7 +67,7 @@ def diagnosis_text(d: Diagnosis, width: int = 100) -> str:
 def verdict_sentence(d: Diagnosis) -> str:
     """What an engineer can act on, and what it brings, in one sentence."""
     if d.findings:
-        return f"{_and([cause_clause(f) for f in d.findings], d)}: {brings_clause(d)}"
+        return f"{_and([cause_clause(f) for f in d.findings], d)}: {brings_clause(d)}{_rivals(d.findings)}"
     if d.unexplained.significant or d.patterns:
         return "no effect with a name was found, but something is there: " + (
             unexplained_sentence(d.unexplained) if d.unexplained.significant else patterns_sentence(d)
@@ -137,7 +137,7 @@ def patterns_sentence(d: Diagnosis) -> str:
     """Patterns that were added without a name; empty where there are none."""
     if not d.patterns:
         return ""
-    return f"in the model without a name: {'; '.join(one_line(one) for one in d.patterns)}"
+    return f"added to the model without a name: {'; '.join(one_line(one) for one in d.patterns)}"
 
 
 def inseparable_lines(d: Diagnosis) -> list[str]:
@@ -312,6 +312,12 @@ def _nats(value: float) -> str:
 def _spread(values: Sequence[float], unit: str) -> str:
     low, high = (plain(of, 2) for of in (min(values), max(values)))
     return f"{low if low == high else f'{low} … {high}'} {unit}".strip()
+
+
+def _rivals(findings: Sequence[Finding]) -> str:
+    """A verdict must not sound surer than the drive allows."""
+    names = dict.fromkeys(one_line(name) for f in findings for name in f.indistinguishable_from)
+    return f"; {' or '.join(names)} would explain the same as well" if names else ""
 
 
 def _and(clauses: Sequence[str], d: Diagnosis) -> str:
