@@ -88,7 +88,8 @@ def _better(fine: Loop, path: Loop) -> Loop:
     if not path.steps or drift_fine is None or drift_path is None or drift_path > BETTER * drift_fine:
         return fine
     before = path.first_judged.outage_end_rms_m
-    gross = before is not None and drift_path < GROSS * before
+    unseen = path.steps[0].score.effect.name not in [step.score.effect.name for step in fine.steps]
+    gross = unseen and before is not None and drift_path < GROSS * before
     return path if gross or drift_path < CLEARLY * drift_fine else fine
 
 
@@ -177,8 +178,8 @@ def _finding(
 def _is_second_order(loop: Loop, step: Step) -> bool:
     """Whether a second harmonic of the heading is only what a first one of its size brings along.
 
-    A hard iron of A radians has a second harmonic of A²/2 by the compass's geometry, and none where its error is sine and
-    cosine alone. The model keeps it either way; it is no second cause.
+    A hard iron of A radians has a second harmonic of A²/2 by the compass's geometry, and none where its error is sine
+    and cosine alone. The model keeps it either way; it is no second cause.
     """
     if step.score.effect.name != "soft_iron":
         return False

@@ -37,7 +37,7 @@ LEVEL_NATS, LEVEL_SHARE = 5.0, 0.04
 """Likelihoods this near, in nats or in parts of the gain, do not tell two causes apart."""
 KEPT_T = 3.0
 HINT_NATS, HINT_T, MAX_HINTS = 3.0, 3.5, 3
-MIN_SWALLOWED_NATS = 15.0
+MIN_SWALLOWED_NATS, FREED_NATS = 15.0, 4.0
 WANDERING_RAD = np.radians(1.0)
 MIN_WANDER_NATS, MIN_WANDER_T, MOST_LEFT = 3.0, 6.0, 0.5
 WORSE, MUCH_WORSE = 1.02, 1.15
@@ -241,7 +241,11 @@ def _swallowed(
         grown = _with(loop.model, accepted, score.values)
         gain = _nll(loop.model) - _nll(grown)
         size, t = size_in(grown, effect)
-        if gain < max(MIN_SWALLOWED_NATS, least_nats) or size < 1.0 or t < MIN_T:
+        # What the noise gives back when the effect is in counts as much as a likelihood that is little higher.
+        needed = (
+            FREED_NATS if _heading_variance(grown) < MOST_LEFT * _heading_variance(loop.model) else MIN_SWALLOWED_NATS
+        )
+        if gain < max(needed, least_nats) or size < 1.0 or t < MIN_T:
             continue
         after = judge(grown, window_s)
         if _doubt(loop.judged, after, grown, effect, False):
@@ -271,14 +275,17 @@ def wandering(loop: Loop) -> Score | None:
         grown = _with(model, Accepted(Free(pattern)), np.zeros(len(pattern.parameters)))
         gain = _nll(model) - _nll(grown)
         size, t = size_in(grown, pattern)
-        was, left = (
-            np.mean([problem.noise.heading_coloured_rad**2 for problem in one.problems]) for one in (model, grown)
-        )
-        if gain >= MIN_WANDER_NATS and t >= MIN_WANDER_T and size >= 1.0 and left < MOST_LEFT * was:
+        freed = _heading_variance(grown) < MOST_LEFT * _heading_variance(model)
+        if gain >= MIN_WANDER_NATS and t >= MIN_WANDER_T and size >= 1.0 and freed:
             values = np.array([float(v.mean()) for v, _, _ in values_in(grown, pattern)])
             sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, pattern)])
             found.append(Score(pattern, gain, gain, t, values, sigmas, size))
     return max(found, key=lambda one: one.gain_nats, default=None)
+
+
+def _heading_variance(model: Model) -> float:
+    """Of the heading's slow error, rad², the runs' mean."""
+    return float(np.mean([problem.noise.heading_coloured_rad**2 for problem in model.problems]))
 
 
 def _nll(model: Model) -> float:

@@ -28,6 +28,8 @@ HEADING_HZ, FIX_HZ, WHEEL_HZ, OUTPUT_HZ = 2.0, 1.0, 5.0, 1.0
 WINDOW_S = 4.0
 SUSPECTS = 6
 GRID = 14
+BESIDE_S = (0.0, 0.7, 1.5)
+"""A jump begins within a second or so of where its window does."""
 APART_S = 12.0
 EDGE_S = 20.0
 """Nothing is looked for so near to the ends: a step there is a start."""
@@ -133,14 +135,15 @@ def find_moments(model: Model, run: int, known: Sequence[str]) -> list[Moment]:
 def _search_time(
     scan: _Scan, whole: RunProblem, run: int, effect: Effect, suspects: Floats, grid: Floats
 ) -> list[Moment]:
-    tries = np.concatenate((suspects, grid))
+    around = (suspects[:, None] + np.array(BESIDE_S)).ravel()
+    tries = np.concatenate((around, grid))
     best, gains = scan.best(effect, [{"at_s": float(s)} for s in tries])
-    ordinary = _ordinary(gains[suspects.size :])
-    step = float(grid[1] - grid[0]) if not np.isin(best["at_s"], suspects) else WINDOW_S
+    ordinary = _ordinary(gains[around.size :])
+    step = float(grid[1] - grid[0]) if not np.isin(best["at_s"], around) else WINDOW_S
     limit = (float(grid[0]), float(grid[-1]))
     for _ in range(ZOOMS):
-        around = np.clip(best["at_s"] + step * np.linspace(-1.0, 1.0, POINTS), *limit)
-        best, _ = scan.best(effect, [{"at_s": float(s)} for s in around])
+        nearby = np.clip(best["at_s"] + step * np.linspace(-1.0, 1.0, POINTS), *limit)
+        best, _ = scan.best(effect, [{"at_s": float(s)} for s in nearby])
         step *= 2.0 / (POINTS - 1)
     found = _moment(scan, run, effect, best, ordinary)
     return [_settled(whole, one, scan) for one in found]

@@ -25,7 +25,8 @@ def variance_fraction(model: Model, pattern: Pattern, values: Floats | None) -> 
         known = dict(zip(names_of(problem), at.values.tolist(), strict=True))
         own = [known.get((pattern.name, one.name), 0.0) for one in free.parameters] if values is None else list(values)
         view = view_run(problem, at, problem.clear_steps(at.constants))
-        added = sum(size * one.column.values for size, one in zip(own, free.placed(view, own, 0), strict=True))
+        placed = [one for one in free.placed(view, own, 0) if one.column.port == pattern.port]  # type: ignore[attr-defined]
+        added = sum(own[one.parameter] * one.column.values for one in placed)
         level = problem.noise
         if pattern.port == "heading":
             error = level.heading_white_rad**2 + level.heading_coloured_rad**2

@@ -53,6 +53,15 @@ class Pattern(Effect):
         raise UsageError(f"effect {self.name}: a pattern cannot be simulated")
 
 
+class _TiltedMast(Pattern):
+    """An antenna high above the ground: nose up it goes back, left side up it goes right."""
+
+    def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
+        name, steps = self.parameters[0].name, drive.steps
+        back, right = (np.sin(drive.at_fixes(tilt)) for tilt in (steps.pitch_rad, steps.roll_rad))
+        return (Column(name, "antenna_forward", -back), Column(name, "antenna_left", -right))
+
+
 def _harmonics(angle: Floats, order: int) -> list[Floats]:
     return [np.cos(order * angle), np.sin(order * angle)]
 
@@ -136,8 +145,7 @@ def _other_patterns() -> list[Pattern]:
         Pattern("side", "time", lambda d: [d.steps.along_m * one for one in _waves(d, d.steps.t_s, 3)], 3),
         Pattern("antenna_forward", "acceleration", lambda d: [d.fixes.acceleration_mps2], 1),
         Pattern("antenna_left", "turn rate", lambda d: [d.fixes.turn_rate_radps], 1),
-        Pattern("antenna_forward", "tilt", lambda d: [np.sin(d.at_fixes(d.steps.pitch_rad))], 1, 2.0),
-        Pattern("antenna_left", "tilt", lambda d: [np.sin(d.at_fixes(d.steps.roll_rad))], 1, 2.0),
+        _TiltedMast("antenna_forward", "tilt", lambda d: [], 1, 2.0),
         Pattern("east", "time", lambda d: _waves(d, d.fixes.t_s, 4), 4),
         Pattern("north", "time", lambda d: _waves(d, d.fixes.t_s, 4), 4),
     ]

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sccal.calibration.extension import view_run
 from sccal.diagnose.evidence import blocks, gather, place, prior_sigmas, rows_of
 from sccal.diagnose.loop import evidence_of
 from sccal.diagnose.model import TRANSPORT, names_of, without_transport
@@ -57,7 +58,7 @@ def test_the_first_20_s_do_not_count():
     timeline = problem.timeline
     evidence = gather(problem, model.at(0), [CATALOGUE["lever_arm"]])
     late = timeline.t_s >= problem.start.moving_from_s + 20.0
-    assert 0 < np.count_nonzero(~late)
+    assert np.count_nonzero(~late) > 0
     scalars = np.count_nonzero(timeline.heading_row[late] >= 0) + 2 * np.count_nonzero(timeline.fix_row[late] >= 0)
     outliers = 0.02 * scalars
     assert scalars - outliers < evidence.count.sum() <= scalars
@@ -114,8 +115,6 @@ def test_one_linear_step_has_the_sign_and_the_unit(text, truth):
 def test_columns_are_numbered_as_their_rows():
     model = bare()
     candidates = [CATALOGUE["lever_arm"], CATALOGUE["turn_slip"], CATALOGUE["eccentric_left"]]
-    from sccal.calibration.extension import view_run
-
     problem, at = model.problems[0], model.at(0)
     placed = place(candidates, view_run(problem, at, problem.clear_steps(at.constants)))
     assert sorted({one.parameter for one in placed}) == list(range(5))

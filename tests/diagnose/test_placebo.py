@@ -10,7 +10,7 @@ import pytest
 from sccal.align import Series
 from sccal.diagnose.placebo import COUNT, NAME, WHERE, Placebo, shuffled, with_placebos
 from sccal.effects.logged import logged_effects
-from tests.diagnose.logs import aligned, diagnosis, diagnosis_with, ThirdHarmonic
+from tests.diagnose.logs import ThirdHarmonic, aligned, diagnosis, diagnosis_with
 
 
 def smooth(count, seed=0):
