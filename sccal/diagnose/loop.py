@@ -139,7 +139,7 @@ def run_loop(
         loop.placebos_passed = sum(passes(one) for one in placebos)
         least = loop.placebo_nats = max((one.held_out_nats for one in placebos), default=0.0)
         ranking = pool.ranked()
-        best = chosen(ranking, least)
+        best = chosen([one for one in ranking if _can_be_judged(loop.model, one.effect)], least)
         moment = _best_moment(loop) if with_moments else None
         if len(loop.steps) >= MAX_FINDINGS:
             return loop
@@ -153,7 +153,8 @@ def run_loop(
         else:
             continue
         if accepted.run is None:
-            best, grown, also = _contest(loop, pool, best, [one for one in ranking if passes(one, least)])
+            passing = [one for one in ranking if passes(one, least) and _can_be_judged(loop.model, one.effect)]
+            best, grown, also = _contest(loop, pool, best, passing)
             accepted = Accepted(Free(best.effect))
         else:
             grown, also = _with(loop.model, accepted, best.values), ()
@@ -185,6 +186,17 @@ def _prune(loop: Loop, window_s: float) -> None:
         loop.steps = [replace(one, before=loop.first_judged) if k == 0 else one for k, one in enumerate(loop.steps)]
         loop.steps[-1] = replace(loop.steps[-1], after=loop.judged)
         return
+
+
+def _can_be_judged(model: Model, effect: Effect) -> bool:
+    """Whether an effect may be a finding under this trust.
+
+    Where only the whole path counts, and runs are judged by others, what belongs to each run alone says nothing to the
+    judge: a clock of its own fits every run's details, which are not to be trusted there.
+    """
+    whole_runs = len(model.problems) >= WHOLE_RUNS
+    own = any(parameter.scope == "run" for parameter in effect.parameters)
+    return not (own and whole_runs and model.regime.name == "path")
 
 
 def _with(model: Model, accepted: Accepted, values: Floats) -> Model:
@@ -235,6 +247,8 @@ def _swallowed(
     for score in (*hinted, *promising):
         effect = score.effect
         if isinstance(effect, Pattern) or effect.name in tried or len(tried) >= MAX_HINTS:
+            continue
+        if not _can_be_judged(loop.model, effect):
             continue
         tried.add(effect.name)
         accepted = Accepted(Free(effect))

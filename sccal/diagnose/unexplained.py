@@ -25,7 +25,7 @@ def variance_fraction(model: Model, pattern: Pattern, values: Floats | None) -> 
         known = dict(zip(names_of(problem), at.values.tolist(), strict=True))
         own = [known.get((pattern.name, one.name), 0.0) for one in free.parameters] if values is None else list(values)
         view = view_run(problem, at, problem.clear_steps(at.constants))
-        placed = [one for one in free.placed(view, own, 0) if one.column.port == pattern.port]  # type: ignore[attr-defined]
+        placed = [one for one in free.placed(view, own, 0) if one.column.port == pattern.port]
         added = sum(own[one.parameter] * one.column.values for one in placed)
         level = problem.noise
         if pattern.port == "heading":

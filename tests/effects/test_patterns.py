@@ -33,15 +33,32 @@ def columns(name):
 @each_pattern
 def test_columns_have_the_rows_of_their_port(name):
     pattern, drive = BY_NAME[name], view()
-    rows = drive.headings if pattern.port in HEADING else drive.fixes if pattern.port in AT_FIXES else drive.steps
     found = columns(name)
-    assert [one.parameter for one in found] == [one.name for one in pattern.parameters]
+    assert list(dict.fromkeys(one.parameter for one in found)) == [one.name for one in pattern.parameters]
+    assert found[0].port == pattern.port
     for one in found:
-        assert one.port == pattern.port
+        rows = drive.headings if one.port in HEADING else drive.fixes if one.port in AT_FIXES else drive.steps
         assert one.values.shape == (rows.t_s.size,)
         assert one.values.dtype == np.float64
         assert np.all(np.isfinite(one.values))
         assert np.ptp(one.values) > 0.0
+
+
+@pytest.mark.parametrize("name", sorted(set(BY_NAME) - {"antenna_forward with tilt"}))
+def test_each_parameter_has_one_column_at_the_port(name):
+    found = columns(name)
+    assert len(found) == len(BY_NAME[name].parameters)
+    assert {one.port for one in found} == {BY_NAME[name].port}
+
+
+def test_a_high_antenna_goes_back_where_the_nose_goes_up():
+    """And to the right where the left side goes up, by as much per radian: one height."""
+    ahead, aside = columns("antenna_forward with tilt")
+    drive = view()
+    assert (ahead.port, aside.port) == ("antenna_forward", "antenna_left")
+    assert ahead.parameter == aside.parameter
+    assert ahead.values == pytest.approx(-np.sin(drive.at_fixes(drive.steps.pitch_rad)))
+    assert aside.values == pytest.approx(-np.sin(drive.at_fixes(drive.steps.roll_rad)))
 
 
 @each_pattern
