@@ -28,7 +28,7 @@ from sccal.diagnose.model import Model, Regime, fine_regime, first_model, path_r
 from sccal.diagnose.picture import picture_of
 from sccal.diagnose.placebo import NAME as NONSENSE
 from sccal.diagnose.placebo import Placebo, with_placebos
-from sccal.diagnose.pool import Score
+from sccal.diagnose.pool import WHOLE_RUNS, Score
 from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, RunNoise, Unexplained
 from sccal.diagnose.result import Placebo as PlaceboResult
 from sccal.diagnose.unexplained import variance_fraction
@@ -88,9 +88,12 @@ def _better(fine: Loop, path: Loop) -> Loop:
     if not path.steps or drift_fine is None or drift_path is None or drift_path > BETTER * drift_fine:
         return fine
     before = path.first_judged.outage_end_rms_m
-    unseen = path.steps[0].score.effect.name not in [step.score.effect.name for step in fine.steps]
-    gross = unseen and before is not None and drift_path < GROSS * before
-    return path if gross or drift_path < CLEARLY * drift_fine else fine
+    named = [step.score.effect.name for step in path.steps if not isinstance(step.score.effect, Pattern)]
+    seen = [step.score.effect.name for step in fine.steps]
+    gross = bool(named) and named[0] not in seen and before is not None and drift_path < GROSS * before
+    # The few windows of one run are no judge between two kinds of trust; whole runs left out are.
+    whole_runs = len(path.model.problems) >= WHOLE_RUNS
+    return path if gross or (whole_runs and drift_path < CLEARLY * drift_fine) else fine
 
 
 def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> Diagnosis:
@@ -136,6 +139,7 @@ def _finding(
 ) -> Finding:
     effect = step.score.effect
     parameters: dict[str, Estimate] = {}
+    per_run: dict[str, tuple[Estimate, ...]] = {}
     for values, by_fit, parameter in values_in(loop.model, effect):
         honest = np.maximum(by_fit, sigmas.get((effect.name, parameter.name), by_fit))
         if step.free.shapes:
@@ -143,6 +147,9 @@ def _finding(
             honest = np.maximum(honest, step.score.sigmas[place])
         if effect.name == "gnss_latency":
             honest = np.hypot(honest, TRANSPORT_S)
+        if values.size > 1:
+            each = zip(values.tolist(), honest.tolist(), strict=True)
+            per_run[parameter.name] = tuple(Estimate(one, sigma, "estimated") for one, sigma in each)
         weight = 1.0 / honest**2
         value = float((weight * values).sum() / weight.sum())
         scatter = float(values.std(ddof=1)) if values.size > 1 else 0.0
@@ -164,6 +171,7 @@ def _finding(
         reference=effect.reference,
         parameters={one.name: parameters[one.name] for one in effect.parameters if one.name in parameters},
         units=units,
+        per_run=per_run,
         held_out_gain_nats=step.score.held_out_nats,
         t=step.score.t,
         indistinguishable_from=step.indistinguishable_from,

@@ -16,6 +16,7 @@ from sccal.effects.effect import Effect
 from sccal.effects.logged import LoggedColumn
 from sccal.effects.patterns import Pattern
 
+BEYOND = 1.5
 SAME = 0.98
 """Correlation from which on two effects are one."""
 
@@ -31,7 +32,8 @@ def excitation(pool: Pool, found: Sequence[Effect]) -> tuple[list[NotExcited], l
         if not parameters:
             continue
         sigmas = pool.score(effect).sigmas
-        least = np.maximum([one.matters for one in parameters], MIN_T * sigmas)
+        # As much as is always possible explains nothing; what is beyond has to stand out.
+        least = np.array([one.matters for one in parameters]) + BEYOND * MIN_T * sigmas
         if np.any(least > [one.prior_sigma for one in parameters]):
             hidden.append(NotExcited(effect.name, effect.title, effect.excited_by))
             continue

@@ -38,6 +38,7 @@ LEVEL_NATS, LEVEL_SHARE = 5.0, 0.04
 KEPT_T = 3.0
 HINT_NATS, HINT_T, MAX_HINTS = 3.0, 3.5, 3
 MIN_SWALLOWED_NATS, FREED_NATS = 15.0, 4.0
+CLEARLY_LESS = 0.9
 WANDERING_RAD = np.radians(1.0)
 MIN_WANDER_NATS, MIN_WANDER_T, MOST_LEFT = 3.0, 6.0, 0.5
 WORSE, MUCH_WORSE = 1.02, 1.15
@@ -143,7 +144,7 @@ def run_loop(
         moment = _best_moment(loop) if with_moments else None
         if len(loop.steps) >= MAX_FINDINGS:
             return loop
-        if moment is not None and (best is None or moment.gain_nats > best.held_out_nats):
+        if moment is not None and (best is None or moment.gain_nats > CLEARLY_BETTER * best.held_out_nats):
             best = _as_score(moment)
             accepted = Accepted(moment.free, moment.run)
         elif best is not None:
@@ -259,9 +260,11 @@ def _swallowed(
         needed = (
             FREED_NATS if _heading_variance(grown) < MOST_LEFT * _heading_variance(loop.model) else MIN_SWALLOWED_NATS
         )
-        if gain < max(needed, least_nats) or size < 1.0 or t < MIN_T:
+        if gain < needed or size < 1.0 or t < MIN_T:
             continue
         after = judge(grown, window_s)
+        if gain < least_nats and not _drifts_less(loop.judged, after, grown):
+            continue
         if _doubt(loop.judged, after, grown, effect, False):
             continue
         values = np.array([float(v.mean()) for v, _, _ in values_in(grown, effect)])
@@ -295,6 +298,13 @@ def wandering(loop: Loop) -> Score | None:
             sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, pattern)])
             found.append(Score(pattern, gain, gain, t, values, sigmas, size))
     return max(found, key=lambda one: one.gain_nats, default=None)
+
+
+def _drifts_less(before: Judged, after: Judged, grown: Model) -> bool:
+    """Whether whole runs left out drift clearly less: better evidence than nats that nonsense can gain too."""
+    if len(grown.problems) < WHOLE_RUNS or not before.outage_end_rms_m or not after.outage_end_rms_m:
+        return False
+    return after.outage_end_rms_m < CLEARLY_LESS * before.outage_end_rms_m
 
 
 def _heading_variance(model: Model) -> float:

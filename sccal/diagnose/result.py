@@ -6,7 +6,7 @@ Angles are in radians here, but for effects' parameters, which are in the files'
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Estimate, Noise, OutageWindow, Parameters
@@ -70,6 +70,8 @@ class Finding:
     """End of the outage windows, rms, held out, before and after this step."""
     drift_after_m: float | None
     picture: Picture | None
+    per_run: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    """Of each parameter that every run has its own of, in the order of the runs; ``parameters`` has their mean."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
     heading~c   heading += p (c − c0)          along~c   travel of both wheels · (1 + p (c − c0))
     yaw~c       turning · (1 + p (c − c0))     side~c    travel to the left = p (c − c0) · travel
+    pull~c      turning += p (c − c0) · travel
 
 c0 is zero where the column reaches near zero, and its mean where it varies little about a large one (a temperature in
 kelvin): the heading offset, the radii and the track then mean what they are at c0.
@@ -23,7 +24,8 @@ from sccal.simulate.physics import Physics
 FAR_FROM_ZERO = 3.0
 HEADING_PRIOR_DEG = 10.0
 MOTION_PRIOR = 0.1
-"""Prior of what one standard deviation of a column does: degrees of heading, and share of a motion."""
+PULL_PRIOR = 0.02
+"""Prior of what one standard deviation of a column does: degrees of heading, share of a motion, radians per metre."""
 REACH = 10.0
 
 _PORTS: dict[str, tuple[Port, str, str, str]] = {
@@ -31,6 +33,7 @@ _PORTS: dict[str, tuple[Port, str, str, str]] = {
     "along": ("along", "per_unit", "1", "stretches the distance driven"),
     "yaw": ("turn", "per_unit", "1", "stretches the turning"),
     "side": ("side", "per_unit", "1", "pushes the robot sideways as it drives"),
+    "pull": ("turn", "per_m_per_unit", "rad/m", "pulls the robot to one side as it drives"),
 }
 """By the name in the files: port, parameter, unit of the effect, what it does."""
 
@@ -60,7 +63,7 @@ class LoggedColumn(Effect):
     def __init__(self, where: str, column: str, values: Range) -> None:
         self.where, self.column, self.range = where, column, values
         self.port, parameter, unit, does = _PORTS[where]
-        prior = (HEADING_PRIOR_DEG if where == "heading" else MOTION_PRIOR) / values.spread
+        prior = {"heading": HEADING_PRIOR_DEG, "pull": PULL_PRIOR}.get(where, MOTION_PRIOR) / values.spread
         self.name = f"{where}~{column}"
         self.title = f"{column} {does}"
         self.parameters = (
@@ -73,7 +76,13 @@ class LoggedColumn(Effect):
         column = drive.logged_at(self.column, t_s) - self.range.reference
         if self.column not in drive.logged:
             column = np.zeros(t_s.size)
-        scaled = {"heading": np.radians(1.0), "along": steps.along_m, "yaw": steps.turn_rad, "side": steps.along_m}
+        scaled = {
+            "heading": np.radians(1.0),
+            "along": steps.along_m,
+            "yaw": steps.turn_rad,
+            "side": steps.along_m,
+            "pull": steps.along_m,
+        }
         return (Column(self.parameters[0].name, self.port, scaled[self.where] * column),)
 
     def physics(self, values: Mapping[str, float]) -> Physics:

@@ -62,6 +62,7 @@ def _finding(finding: Finding) -> Json:
         },
         "evidence": {"held_out_gain_nats": finding.held_out_gain_nats, "t": finding.t},
         "indistinguishable_from": finding.indistinguishable_from,
+        "per_run": {name: [_estimate(one) for one in each] for name, each in finding.per_run.items()},
         "advice": finding.advice,
         "drift_before_m": finding.drift_before_m,
         "drift_after_m": finding.drift_after_m,

@@ -57,16 +57,16 @@ def test_what_is_found_needs_no_advice():
 
 
 @pytest.mark.parametrize("name", ["turn_slip", "heading_latency"])
-def test_three_times_what_is_called_detectable_is_detected(name):
+def test_half_as_much_again_as_what_is_called_detectable_is_detected(name):
     _, shown, _ = excitation(pooled(), [])
     (size,) = next(one.smallest for one in shown if one.name == name).values()
     effects = pooled().candidates
-    pool = Pool(evidence_of(bare(f"{name}={3.0 * size}"), effects), effects)
+    pool = Pool(evidence_of(bare(f"{name}={1.5 * size}"), effects), effects)
     score = pool.score(CATALOGUE[name])
     assert score.t > MIN_T
     assert passes(score)
     assert pool.ranked()[0].effect.name == name
-    assert score.values[0] == pytest.approx(3.0 * size, rel=0.3)
+    assert score.values[0] == pytest.approx(1.5 * size, rel=0.3)
 
 
 def test_effects_that_are_one_on_this_drive_are_told_together():

@@ -17,8 +17,10 @@ from sccal.simulate.world import WheelPair
 from tests.effects.harness import injected
 
 NAME = "motor_current_a"
-WHERE = ("heading", "along", "yaw", "side")
-PER_UNIT = {"heading": 0.8, "along": 0.02, "yaw": 0.02, "side": 0.02}
+TRACK_M = 0.728
+"""Of the simulated vehicle."""
+WHERE = ("heading", "along", "yaw", "side", "pull")
+PER_UNIT = {"heading": 0.8, "along": 0.02, "yaw": 0.02, "side": 0.02, "pull": 0.005}
 
 
 def current(t_s):
@@ -46,6 +48,8 @@ class Caused(Physics):
         along, half = 0.5 * (travel_m.right + travel_m.left), 0.5 * (travel_m.right - travel_m.left)
         along = along / factor if self.where == "along" else along
         half = half / factor if self.where == "yaw" else half
+        if self.where == "pull":
+            half = half - 0.5 * TRACK_M * PER_UNIT["pull"] * current(middle) * along
         return WheelPair(left=along - half, right=along + half)
 
 
@@ -95,7 +99,7 @@ def test_at_the_heading_a_unit_is_a_degree_counter_clockwise(monkeypatch):
     assert PER_UNIT["heading"] * column.values == pytest.approx(error, abs=1e-4)
 
 
-@pytest.mark.parametrize(("where", "port"), [("along", "along"), ("yaw", "turn")])
+@pytest.mark.parametrize(("where", "port"), [("along", "along"), ("yaw", "turn"), ("pull", "turn")])
 def test_at_the_wheels_a_unit_is_a_share(where, port, monkeypatch):
     log = log_of(where, monkeypatch)
     column = values_of(effect_at(where), log.view)
@@ -123,7 +127,8 @@ def test_the_reference_is_taken_off(where, monkeypatch):
     log = log_of(where, monkeypatch)
     zero, two = (values_of(effect_at(where, reference), log.view).values for reference in (0.0, 2.0))
     steps = log.view.steps
-    unit = {"heading": np.radians(1.0), "along": steps.along_m, "yaw": steps.turn_rad, "side": steps.along_m}[where]
+    travel = steps.along_m
+    unit = {"heading": np.radians(1.0), "along": travel, "yaw": steps.turn_rad, "side": travel, "pull": travel}[where]
     assert zero - two == pytest.approx(np.broadcast_to(2.0 * unit, zero.shape))
 
 
@@ -155,11 +160,11 @@ def test_the_reference_is_of_all_runs_together():
 def test_priors_are_of_one_standard_deviation_of_the_column(where):
     narrow, wide = (effect_at(where, spread=spread).parameters[0] for spread in (0.5, 5.0))
     assert narrow.prior_sigma == pytest.approx(10.0 * wide.prior_sigma)
-    assert wide.prior_sigma * 5.0 == pytest.approx(10.0 if where == "heading" else 0.1)
+    assert wide.prior_sigma * 5.0 == pytest.approx({"heading": 10.0, "pull": 0.02}.get(where, 0.1))
     assert 0.0 < narrow.matters < 0.1 * narrow.prior_sigma
     assert narrow.lower < -narrow.prior_sigma
     assert narrow.upper > narrow.prior_sigma
-    assert narrow.unit == ("deg/unit" if where == "heading" else "1/unit")
+    assert narrow.unit == {"heading": "deg/unit", "pull": "rad/m/unit"}.get(where, "1/unit")
 
 
 def test_a_column_that_never_changes_is_no_candidate():
