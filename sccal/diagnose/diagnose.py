@@ -8,6 +8,7 @@ suggested to the fine loop. Of the two final models the one that drifts less on 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from sccal.diagnose.excitation import excitation
 from sccal.diagnose.held_out import Judged, how
 from sccal.diagnose.honest import under_other_trust
 from sccal.diagnose.loop import MIN_HELD_OUT_NATS, Loop, Step, is_flexible, passes, run_loop, values_in, wandering
-from sccal.diagnose.model import Model, Regime, fine_regime, first_model, path_regime
+from sccal.diagnose.model import Model, fine_regime, first_model, path_regime
 from sccal.diagnose.picture import picture_of
 from sccal.diagnose.placebo import NAME as NONSENSE
 from sccal.diagnose.placebo import Placebo, with_placebos
@@ -33,7 +34,6 @@ from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked
 from sccal.diagnose.result import Placebo as PlaceboResult
 from sccal.diagnose.unexplained import variance_fraction
 from sccal.effects.catalogue import CATALOGUE
-from sccal.effects.effect import Effect
 from sccal.effects.logged import logged_effects
 from sccal.effects.patterns import PATTERNS, Pattern
 
@@ -59,21 +59,18 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     own = [{name: one for name, one in run.extras.items() if not name.startswith(NONSENSE)} for run in dressed]
     candidates = (*linear_effects(), *logged_effects(own), *PATTERNS, *placebos)
     window_s = options.outage_window_s
-    path = _loop(dressed, path_regime(options.filter), candidates, window_s, False, ())
+
+    def path_loop() -> Loop:
+        return run_loop(first_model(dressed, path_regime(options.filter)), candidates, window_s, with_moments=False)
+
+    # The first fine model waits for nothing that the path loop finds; side by side they share the cores.
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        running = beside.submit(path_loop)
+        first = first_model(dressed, fine_regime(options.filter, options.heading_rate_hz))
+        path = running.result()
     suggestions = [_at_the_end(path, step) for step in path.steps if not isinstance(step.score.effect, Pattern)]
-    fine = _loop(dressed, fine_regime(options.filter, options.heading_rate_hz), candidates, window_s, True, suggestions)
+    fine = run_loop(first, candidates, window_s, suggestions=suggestions)
     return _told(_better(fine, path), runs, placebos)
-
-
-def _loop(
-    runs: Sequence[Aligned],
-    regime: Regime,
-    candidates: Sequence[Effect],
-    window_s: float,
-    with_moments: bool,
-    suggestions: Sequence[Score],
-) -> Loop:
-    return run_loop(first_model(runs, regime), candidates, window_s, with_moments, suggestions)
 
 
 def _at_the_end(loop: Loop, step: Step) -> Score:

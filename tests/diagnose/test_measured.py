@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from sccal.batch import calibrate_paths
 from sccal.calibration.options import CalibrationOptions
 from sccal.diagnose.diagnose import diagnose
 from sccal.logs.run import discover, read_run
+from sccal.report.diagnosis_text import diagnosis_text
 
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 LOGS = Path(__file__).resolve().parents[2].parent / "shared" / "logs"
 
 pytestmark = [
@@ -35,6 +38,18 @@ def test_the_van_lacks_its_antenna_beside_the_middle():
     assert 1.5 < found.parameters_after.track_m.value < 1.7
     assert found.after.outage_end_rms_m <= 0.6 * found.before.outage_end_rms_m
     assert found.placebo.passed == 0
+    the_readme_shows(diagnosis_text(found, 100))
+
+
+def the_readme_shows(printed):
+    """The tables in the README: words to the letter, numbers to a few units of their last digit."""
+    text = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
+    block = text.split("<!-- output of: sccal diagnose psu-van -->")[1].split("<!-- end -->")[0]
+    lines = {NUMBER.sub("#", line.strip()): line for line in printed.splitlines()}
+    for shown in (line.strip() for line in block.splitlines() if line.strip()):
+        ours = lines[NUMBER.sub("#", shown)]
+        for a, b in zip(NUMBER.findall(shown), NUMBER.findall(ours), strict=True):
+            assert float(a) == pytest.approx(float(b), rel=0.05, abs=5 * 10.0 ** -len(a.partition(".")[2]))
 
 
 def test_the_husky_lacks_the_iron_at_its_compass():
