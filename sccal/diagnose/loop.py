@@ -267,9 +267,7 @@ def _swallowed(
             continue
         if _doubt(loop.judged, after, grown, effect, False):
             continue
-        values = np.array([float(v.mean()) for v, _, _ in values_in(grown, effect)])
-        sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, effect)])
-        found = Score(effect, gain, gain, t, values, sigmas, size)
+        found = _score_in(grown, effect, gain)
         loop.steps.append(Step(found, accepted.free, None, (), tuple(ranking), loop.judged, after))
         loop.model, loop.judged = grown, after
         return True
@@ -294,9 +292,7 @@ def wandering(loop: Loop) -> Score | None:
         size, t = size_in(grown, pattern)
         freed = _heading_variance(grown) < MOST_LEFT * _heading_variance(model)
         if gain >= MIN_WANDER_NATS and t >= MIN_WANDER_T and size >= 1.0 and freed:
-            values = np.array([float(v.mean()) for v, _, _ in values_in(grown, pattern)])
-            sigmas = np.array([float(s.mean()) for _, s, _ in values_in(grown, pattern)])
-            found.append(Score(pattern, gain, gain, t, values, sigmas, size))
+            found.append(_score_in(grown, pattern, gain))
     return max(found, key=lambda one: one.gain_nats, default=None)
 
 
@@ -305,6 +301,15 @@ def _drifts_less(before: Judged, after: Judged, grown: Model) -> bool:
     if len(grown.problems) < WHOLE_RUNS or not before.outage_end_rms_m or not after.outage_end_rms_m:
         return False
     return after.outage_end_rms_m < CLEARLY_LESS * before.outage_end_rms_m
+
+
+def _score_in(model: Model, effect: Effect, gain_nats: float) -> Score:
+    """An effect as a refitted model has it, found by the whole likelihood."""
+    size, t = size_in(model, effect)
+    inside = values_in(model, effect)
+    values = np.array([float(each.mean()) for each, _, _ in inside])
+    sigmas = np.array([float(each.mean()) for _, each, _ in inside])
+    return Score(effect, gain_nats, gain_nats, t, values, sigmas, size)
 
 
 def _heading_variance(model: Model) -> float:

@@ -255,7 +255,7 @@ def _peaks(t_s: Floats, squared: Floats, start_s: float, end_s: float) -> Floats
     order = np.argsort(scores)[::-1]
     chosen: list[float] = []
     for k in order:
-        # The jump stands where the window begins to be bad: its first large innovation.
+        # The jump stands where the window begins to be bad: about its largest innovation.
         here = inside & (t_s >= edges[k]) & (t_s < edges[k] + WINDOW_S)
         if not here.any():
             continue

@@ -155,14 +155,13 @@ class Pool:
     @cached_property
     def _small_gain(self) -> tuple[float, float]:
         """Held-out gain of small amounts of everything: over the folds, and over those of time."""
-        run_effects = [e.name for e in self.candidates if any(one.scope == "run" for one in e.parameters)]
         values = []
         for folds in (self.folds, self.time_folds):
             u_all, information_all = sum(u for u, _ in folds), sum(i for _, i in folds)
             none = np.zeros(0, np.int64)
             each = [(u, i, self._solve(u_all - u, information_all - i, none, none)) for u, i in folds]
             values.append(float(sum(_quadratic(u, i, v) for u, i, v in each)))
-        return values[0], values[1] if run_effects else values[0]
+        return values[0], values[1]
 
     def score(self, effect: Effect) -> Score:
         """Everything about one candidate."""
