@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sccal.align.accuracy import (
-    QUALITY_NAMES,
-    SIMULATOR_QUALITY,
-    fix_covariance,
-    table_sigma_m,
-    usable,
-)
+from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m, usable
 from sccal.align.agreement import check_agreement
-from sccal.align.clocks import Clock, fixes_on_host_clock, require_overlap
+from sccal.align.clocks import Clock, require_overlap
 from sccal.align.path import laid_out
+from sccal.align.reference import (
+    ReferenceFixes,
+    in_order,
+    in_plane,
+    leading_fixes,
+    on_host_clock,
+    reference_fixes,
+)
 from sccal.align.signs import check_signs
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
+from sccal.logs.windows import Window, windows_on_clock, within
 
 MIN_MEASUREMENTS = 10
 
@@ -66,6 +69,8 @@ class Aligned:
     notices: tuple[Notice, ...]
     extras: Mapping[str, Series] = field(default_factory=dict)
     """The log's further columns by name; where two files share a name, the later one's carries its file's."""
+    reference: ReferenceFixes | None = None
+    """Fixes that judge and never teach; None where all fixes teach."""
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -93,10 +98,13 @@ def yaw_to_enu(yaw_rad: Floats, convention: Convention) -> Floats:
     return yaw_rad if convention == "enu" else 0.5 * np.pi - yaw_rad
 
 
-def align(run: Run) -> Aligned:
-    """Bring the streams of one run together.
+def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
+    """Bring the streams of one run together; fixes inside the windows ``withhold_s`` judge and do not teach.
 
-    Raises DataError where clocks, amounts of data or signs make a calibration impossible.
+    Windows are in the log's own time, or from its start where they do not lie in it (see windows_on_clock).
+
+    Raises DataError where clocks, amounts of data or signs make a calibration impossible, UsageError for windows
+    outside the run.
     """
     notices = list(run.notices)
     wheels, heading, fixes = run.wheels, run.heading, run.fixes
@@ -105,7 +113,7 @@ def align(run: Run) -> Aligned:
     wheels = _from_first_heading(wheels, heading)
     span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
 
-    t_s, timed, clock = fixes_on_host_clock(fixes, span)
+    t_s, timed, clock, before_t_s = on_host_clock(fixes, run.reference, span)
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
     require_overlap(t_s[timed], span, clock, "the fixes")
@@ -119,10 +127,8 @@ def align(run: Run) -> Aligned:
     if simulated:
         notices.append(Notice("gnss", "fixes say they come from a simulator (quality 8)", simulated, "", "warning"))
     good &= _inside(np.where(good, t_s, np.nan), span, "gnss", notices)
-    order = np.argsort(t_s[good], kind="stable")
-    good_index = np.flatnonzero(good)[order]
-    fresh = np.concatenate(([True], np.diff(t_s[good_index]) > 0)) if good_index.size else np.zeros(0, bool)
-    good_index = good_index[fresh]
+    judges = good & within(t_s, windows_on_clock(withhold_s, whole))
+    good_index = in_order(t_s, good & ~judges)
     if good_index.size < MIN_MEASUREMENTS:
         raise DataError(
             f"gnss: {good_index.size} usable fixes within the wheels' span of {span[1] - span[0]:.1f} s, "
@@ -136,16 +142,15 @@ def align(run: Run) -> Aligned:
             f"at least {MIN_MEASUREMENTS} are needed"
         )
 
-    lat, lon = fixes.lat_deg[good_index], fixes.lon_deg[good_index]
     quality = fixes.quality[good_index]
     alt = fixes.alt_m[good_index]
     height = float(np.median(alt[np.isfinite(alt)])) if np.isfinite(alt).any() else 0.0
-    best = table_sigma_m(quality) <= table_sigma_m(quality).min()
-    plane = TangentPlane(float(lat[best][0]), float(lon[best][0]), round(height, 2))
-    east, north = plane.to_east_north(lat, lon)
-    var_east, var_north, cov = fix_covariance(
-        quality, fixes.sigma_east_m[good_index], fixes.sigma_north_m[good_index], fixes.cov_en_m2[good_index]
-    )
+    origin = good_index[table_sigma_m(quality) <= table_sigma_m(quality).min()][0]
+    plane = TangentPlane(float(fixes.lat_deg[origin]), float(fixes.lon_deg[origin]), round(height, 2))
+    placed = in_plane(fixes, t_s, good_index, plane)
+    withheld = [] if not judges.any() else [(fixes, np.where(judges, t_s, np.nan), judges)]
+    if run.reference is not None:
+        withheld.append((run.reference.fixes, before_t_s, run.reference.lost))
 
     aligned = Aligned(
         name=run.name,
@@ -162,19 +167,20 @@ def align(run: Run) -> Aligned:
         pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
         roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
         fix_t_s=t_s[good_index],
-        fix_east_m=east,
-        fix_north_m=north,
+        fix_east_m=placed.east_m,
+        fix_north_m=placed.north_m,
         fix_quality=quality,
-        fix_var_east_m2=var_east,
-        fix_var_north_m2=var_north,
-        fix_cov_m2=cov,
-        fix_leading=_leading(quality, var_east + var_north),
+        fix_var_east_m2=placed.var_east_m2,
+        fix_var_north_m2=placed.var_north_m2,
+        fix_cov_m2=placed.cov_m2,
+        fix_leading=leading_fixes(placed),
         notices=tuple(notices),
         extras=_further_columns(
             ("encoder", wheels.t_s, wheels.extras),
             ("ahrs", heading.t_s, heading.extras),
             ("gnss", t_s[good_index], {name: values[good_index] for name, values in fixes.extras.items()}),
         ),
+        reference=reference_fixes(withheld, span, plane),
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
@@ -215,10 +221,3 @@ def _inside(t_s: Floats, span: tuple[float, float], source: str, notices: list[N
     if outside:
         notices.append(Notice(source, "measurements outside the time that wheels and heading share not used", outside))
     return inside
-
-
-def _leading(quality: Ints, variance_m2: Floats) -> Bools:
-    """Fixes of the quality with the largest sum of 1/σ²."""
-    codes = np.unique(quality)
-    information = [float((1.0 / variance_m2[quality == code]).sum()) for code in codes]
-    return np.asarray(quality == codes[int(np.argmax(information))])

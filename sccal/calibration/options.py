@@ -19,5 +19,7 @@ class CalibrationOptions:
     """Readings beyond this rate are left out: an AHRS's error changes more slowly."""
     noise: Noise | None = None
     """None: estimated from the log."""
+    withhold_s: tuple[tuple[float, float], ...] = ()
+    """Windows whose fixes judge and do not teach; in the log's own time, or from its start."""
     effects: tuple[str, ...] = ()
     """Names of effects beyond the paper's model that the filter estimates too."""

@@ -24,12 +24,25 @@ HOW = (
 )
 
 
-def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: float) -> Outage:
-    """Run a begun filter to its end and judge it on every window on the way."""
-    timeline, events = run.timeline, run.events
-    judged = aligned.fix_leading[timeline.fix_index]
+def run_with_outages(
+    run: Filter,
+    aligned: Aligned,
+    start: Start,
+    window_s: float,
+    lost: Bools | None = None,
+    judges_m: Floats | None = None,
+) -> Outage:
+    """Run a begun filter to its end and judge it on every window on the way.
+
+    ``lost`` (f,) marks fixes of the filter's timeline that teach nothing (Filter.blind); windows that hold one are left
+    out, for there the drift would not begin at the window's start. ``judges_m`` (f, 2) are the places, east and north,
+    to judge by; by default those of the fixes.
+    """
+    timeline = run.timeline
+    known = np.ones(timeline.fix_index.size, dtype=np.bool_) if lost is None else ~lost
+    judges = fixes_of(run) if judges_m is None else judges_m
+    judged = aligned.fix_leading[timeline.fix_index] & known
     fix_t = aligned.fix_t_s[timeline.fix_index]
-    travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(aligned.travel_m)))))
     scratch = run.make_output(with_states=False)
     scratch = scratch._replace(state=run.output.state.copy(), sigma=run.output.sigma.copy())
     settled = max(start.until_s, start.moving_from_s + SETTLING_S)
@@ -37,10 +50,12 @@ def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: floa
     begin = settled
     while begin + window_s <= aligned.span_s[1]:
         end = begin + window_s
-        rows = np.flatnonzero((fix_t > begin) & (fix_t <= end) & judged)
+        inside = (fix_t > begin) & (fix_t <= end)
+        rows = np.flatnonzero(inside & judged)
         first, last = np.searchsorted(timeline.t_s, [begin, end], side="right")
         run.run_to(int(first))
-        if rows.size >= MIN_FIXES and fix_t[rows[-1]] - begin >= MIN_COVERED * window_s:
+        covered = rows.size >= MIN_FIXES and fix_t[rows[-1]] - begin >= MIN_COVERED * window_s
+        if covered and known[inside].all():
             run.outage_to(int(last), scratch)
             predicted.append((begin, end, rows, scratch.antenna[rows].copy()))
         begin = end
@@ -49,23 +64,30 @@ def run_with_outages(run: Filter, aligned: Aligned, start: Start, window_s: floa
     windows = []
     for begin, end, rows, antenna in predicted:
         kept = ~outlying[rows]
-        if kept.sum() < MIN_FIXES:
-            continue
-        seen = rows[kept]
-        drift = np.hypot(events.fix_east_m[seen] - antenna[kept, 0], events.fix_north_m[seen] - antenna[kept, 1])
-        distance = float(np.diff(np.interp([begin, end], aligned.wheel_t_s, travelled))[0])
-        windows.append(
-            OutageWindow(
-                start_s=begin,
-                end_s=end,
-                distance_m=distance,
-                rms_drift_m=float(np.sqrt(np.mean(drift**2))),
-                end_drift_m=float(drift[-1]),
-                t_s=fix_t[seen],
-                drift_m=drift,
-            )
-        )
+        if kept.sum() >= MIN_FIXES:
+            kept_rows = rows[kept]
+            windows.append(drift_in_window(aligned, (begin, end), fix_t[kept_rows], judges[kept_rows] - antenna[kept]))
     return summarise(windows, window_s, HOW.format(first=settled - start.moving_from_s))
+
+
+def fixes_of(run: Filter) -> Floats:
+    """(f, 2) east and north of the fixes of a filter's timeline."""
+    return np.column_stack((run.events.fix_east_m, run.events.fix_north_m))
+
+
+def drift_in_window(aligned: Aligned, window_s: tuple[float, float], t_s: Floats, apart_m: Floats) -> OutageWindow:
+    """One window's figures from its fixes' times (k,) and how far they are from the predicted antenna (k, 2)."""
+    drift = np.hypot(apart_m[:, 0], apart_m[:, 1])
+    travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(aligned.travel_m)))))
+    return OutageWindow(
+        start_s=window_s[0],
+        end_s=window_s[1],
+        distance_m=float(np.diff(np.interp(window_s, aligned.wheel_t_s, travelled))[0]),
+        rms_drift_m=float(np.sqrt(np.mean(drift**2))),
+        end_drift_m=float(drift[-1]),
+        t_s=t_s,
+        drift_m=drift,
+    )
 
 
 def isolated(rejected: Bools, too_many: int) -> Bools:

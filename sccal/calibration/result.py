@@ -15,6 +15,7 @@ from sccal.filter.forward import Noise
 from sccal.logs.streams import Notice, Vehicle
 
 __all__ = [
+    "AgainstReference",
     "Calibration",
     "Clock",
     "Drive",
@@ -29,6 +30,7 @@ __all__ = [
     "Residuals",
     "Status",
     "Trajectory",
+    "Unseen",
     "VehicleCalibration",
 ]
 
@@ -106,6 +108,32 @@ class Outage:
     """Sum of the end drifts over the sum of the distances driven in the windows, in percent."""
     how: str
     """Which data taught the filter and which judged it, in words."""
+
+
+@dataclass(frozen=True)
+class AgainstReference:
+    """The forward filter judged by fixes that it never saw: withheld ones, or those from before a log was degraded."""
+
+    losses: Outage | None
+    """One window for each stretch whose fixes are lost; None where none is."""
+    displaced_rms_m: float | None
+    """Root mean square distance of the predicted from the undisplaced fixes; None where none was displaced."""
+    displaced: int
+    """How many fixes that is."""
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """A parameter beyond the model that these data could not show at any size worth looking for."""
+
+    effect: str
+    title: str
+    parameter: str
+    unit: str
+    sigma: float
+    """What its standard deviation would be, were it estimated."""
+    smallest: float
+    """Smallest size that would stand out."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +229,9 @@ class Calibration:
     notices: tuple[Notice, ...]
     """Everything that readers, alignment and filter had to repair, drop or doubt."""
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    against_reference: AgainstReference | None = None
+    """None where all fixes teach and were never displaced."""
+    unseen: tuple[Unseen, ...] = ()
 
 
 @dataclass(frozen=True)

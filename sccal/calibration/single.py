@@ -13,6 +13,7 @@ from sccal.arrays import Floats
 from sccal.calibration.extension import FreeEffects
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import run_with_outages
+from sccal.calibration.reference import judged_forward
 from sccal.calibration.result import (
     Calibration,
     Drive,
@@ -24,6 +25,7 @@ from sccal.calibration.result import (
     Trajectory,
 )
 from sccal.calibration.status import judge
+from sccal.calibration.unseen import unseen_parameters
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, iterate, reported_covariance, reported_values
 from sccal.filter.noise import estimate_noise
@@ -48,14 +50,18 @@ def prepare(aligned: Aligned, options: CalibrationOptions) -> RunProblem:
 
 def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, RunProblem]:
     """Calibrate one run. Raises DataError where the data cannot support it."""
-    aligned = align(run)
+    aligned = align(run, options.withhold_s)
     del run  # an hour of raw streams is not needed any more, and as large as all that follows
     problem = prepare(aligned, options)
     start = problem.start
 
-    forward = problem.begun(problem.at_centre())
-    outage = run_with_outages(forward, aligned, start, options.outage_window_s)
-    honest = forward.finish()
+    judged = None
+    if aligned.reference is None:
+        forward = problem.begun(problem.at_centre())
+        outage = run_with_outages(forward, aligned, start, options.outage_window_s)
+        honest = forward.finish()
+    else:
+        honest, outage, judged = judged_forward(problem, options)
 
     learnt = reported_values(honest)
     values, final = iterate(problem, At(Constants.of(learnt), learnt[4:], honest))
@@ -82,6 +88,8 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
             notices=(*aligned.notices, *_doubts(problem, final)),
             effects=_effects(problem, values[4:], covariance[4:, 4:]),
+            against_reference=judged,
+            unseen=unseen_parameters(problem, values),
         ),
         problem,
     )

@@ -113,6 +113,8 @@ class Filter:
         self.P = np.zeros((self.states, self.states))
         self.memory = np.zeros(MEMORY_SIZE)
         self.position = 0
+        self.blind: tuple[tuple[int, int], ...] = ()
+        """Ranges of events, in order, whose fixes are predicted and compared but teach nothing."""
 
     def make_output(self, with_states: bool) -> Output:
         """Room for what a pass leaves."""
@@ -161,10 +163,26 @@ class Filter:
     def run_to(self, last: int | None = None) -> None:
         """Run on to (not including) event ``last``; to the end if None."""
         last = self.events.t_s.size if last is None else last
-        kernel.forward(
-            self.events, self.columns, self.model, self.x, self.P, self.memory, self.position, last, True, self.output
-        )
-        self.position = last
+        for first_blind, last_blind in self.blind:
+            self._advance(min(first_blind, last), fixes_teach=True)
+            self._advance(min(last_blind, last), fixes_teach=False)
+        self._advance(last, fixes_teach=True)
+
+    def _advance(self, last: int, fixes_teach: bool) -> None:
+        if last > self.position:
+            kernel.forward(
+                self.events,
+                self.columns,
+                self.model,
+                self.x,
+                self.P,
+                self.memory,
+                self.position,
+                last,
+                fixes_teach,
+                self.output,
+            )
+            self.position = last
 
     def outage_to(self, last: int, scratch: Output) -> None:
         """From here to event ``last`` as if there were no fixes, on copies: this filter stays where it is.

@@ -103,6 +103,15 @@ class FixStream:
 
 
 @dataclass(frozen=True)
+class Reference:
+    """Fixes of a degraded log as they were before: they judge what the filter says and never teach it."""
+
+    fixes: FixStream
+    lost: Bools
+    """(n,) True where the degraded log has no fix any more; False where it has one that was displaced, or the same."""
+
+
+@dataclass(frozen=True)
 class Run:
     """One run, read and repaired but not yet aligned."""
 
@@ -114,3 +123,5 @@ class Run:
     heading: HeadingStream
     fixes: FixStream
     notices: tuple[Notice, ...] = ()
+    reference: Reference | None = None
+    """Of a log that `sccal degrade` made; None of every other."""

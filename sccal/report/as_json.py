@@ -14,6 +14,7 @@ from typing import Any
 
 from sccal import __version__
 from sccal.calibration.result import (
+    AgainstReference,
     Calibration,
     Clock,
     Drive,
@@ -22,6 +23,7 @@ from sccal.calibration.result import (
     Noise,
     Outage,
     Parameters,
+    Unseen,
     VehicleCalibration,
 )
 from sccal.logs.streams import Notice
@@ -49,6 +51,8 @@ def calibration_json(c: Calibration) -> Json:
             "origin": {"lat_deg": c.origin_lat_deg, "lon_deg": c.origin_lon_deg},
             "fit": _fit(c.fit),
             "outage": _outage(c.outage),
+            "reference": _reference(c.against_reference),
+            "unseen": [_unseen(one) for one in c.unseen],
             "noise": _noise(c.noise),
             "drive": _drive(c.drive),
             "clock": _clock(c.clock),
@@ -140,6 +144,26 @@ def _outage(outage: Outage) -> Json:
             }
             for window in outage.windows
         ],
+    }
+
+
+def _reference(judged: AgainstReference | None) -> Json | None:
+    if judged is None:
+        return None
+    return {
+        "losses": None if judged.losses is None else _outage(judged.losses),
+        "displaced": judged.displaced,
+        "displaced_rms_m": judged.displaced_rms_m,
+    }
+
+
+def _unseen(one: Unseen) -> Json:
+    return {
+        "effect": one.effect,
+        "parameter": one.parameter,
+        "unit": one.unit,
+        "sigma": one.sigma,
+        "smallest": one.smallest,
     }
 
 

@@ -20,6 +20,9 @@ from sccal.report.summary import (
     noise_facts,
     outage_line,
     recoveries_line,
+    reference_lines,
+    unseen_in_all,
+    unseen_line,
     warnings_first,
 )
 from sccal.report.verdict import Verdict, run_verdict, vehicle_verdict
@@ -53,7 +56,11 @@ def run_html(c: Calibration) -> str:
         rows=(*parameter_rows(c.parameters), *effect_rows(c.effects)),
         drive=drive_line(c.drive),
         drawings=run_drawings(c),
-        fit=_fit_facts(c.fit, c.outage),
+        fit=(
+            *_fit_facts(c.fit, c.outage),
+            *(("losses", line) for line in reference_lines(c.against_reference)),
+            ("unseen", unseen_line(c.unseen)),
+        ),
         noise=(*noise_facts(c.noise), ("clock", clock_line(c.clock))),
         notices=warnings_first(c.notices),
         origin=f"{c.origin_lat_deg:.7f}, {c.origin_lon_deg:.7f}",
@@ -76,7 +83,11 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
         runs=[_run_line(c) for c in v.runs],
         total=f"{count} · {time} · {plain(sum(c.drive.distance_m for c in v.runs))} m",
         drawings=vehicle_drawings(v),
-        fit=(("runs", agreement), *_fit_facts(v.fit, v.outage)),
+        fit=(
+            ("runs", agreement),
+            *_fit_facts(v.fit, v.outage),
+            ("unseen", unseen_line(unseen_in_all([c.unseen for c in v.runs]))),
+        ),
         notices=warnings_first(v.notices),
         version=__version__,
         variant=_variant(v.with_offset),

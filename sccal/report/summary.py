@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from sccal.calibration.result import Clock, Drive, Fit, Noise, Outage
+from sccal.calibration.result import AgainstReference, Clock, Drive, Fit, Noise, Outage, OutageWindow, Unseen
 from sccal.logs.streams import Notice
 from sccal.report.numbers import MISSING, duration, one_line, plain, short
+
+LOSSES_SHOWN = 5
 
 
 def fixes_line(fit: Fit) -> str:
@@ -42,6 +44,50 @@ def outage_line(outage: Outage) -> str:
         f"drift after {window} s without fixes: {_measured(outage.end_rms_m, 'm', 2)} rms{share}, "
         f"{count} window{'' if count == 1 else 's'}"
     )
+
+
+def reference_lines(judged: AgainstReference | None) -> tuple[str, ...]:
+    """What fixes that the filter never saw say: a line for each loss, one for all displaced fixes."""
+    if judged is None:
+        return ()
+    lines = [_loss_line(window) for window in judged.losses.windows[:LOSSES_SHOWN]] if judged.losses else []
+    if judged.losses and len(judged.losses.windows) > LOSSES_SHOWN:
+        rms = _measured(judged.losses.end_rms_m or math.nan, "m", 3)
+        lines.append(f"… {len(judged.losses.windows)} losses in all, {rms} rms at their ends")
+    if judged.displaced_rms_m is not None:
+        rms = _measured(judged.displaced_rms_m, "m")
+        lines.append(
+            f"{judged.displaced} fixes are displaced; the filter on its way is {rms} rms from their true places"
+        )
+    return tuple(lines)
+
+
+def _loss_line(window: OutageWindow) -> str:
+    length = plain(window.end_s - window.start_s, 3)
+    share = 100.0 * window.end_drift_m / window.distance_m if window.distance_m > 0.0 else math.nan
+    end, rms = _measured(window.end_drift_m, "m"), _measured(window.rms_drift_m, "m")
+    return (
+        f"no fixes for {length} s from t = {window.start_s:.2f} s: drift {end} at the end "
+        f"({plain(share, 2)} % of {_measured(window.distance_m, 'm')}), {rms} rms on the way"
+    )
+
+
+def unseen_line(unseen: Sequence[Unseen]) -> str:
+    """Parameters beyond the model that these data do not show; empty where they show all that was asked."""
+    if not unseen:
+        return ""
+    parts = [f"{one.effect} {one.parameter} below {plain(one.smallest, 2)} {one.unit}" for one in unseen]
+    return f"these data would not show {', '.join(parts)}"
+
+
+def unseen_in_all(runs: Sequence[Sequence[Unseen]]) -> tuple[Unseen, ...]:
+    """What no run shows, each by the run that comes nearest to showing it."""
+    found = []
+    for one in runs[0] if runs else ():
+        same = [o for run in runs for o in run if (o.effect, o.parameter) == (one.effect, one.parameter)]
+        if len(same) == len(runs):
+            found.append(min(same, key=lambda o: o.smallest))
+    return tuple(found)
 
 
 def noise_facts(noise: Noise) -> tuple[tuple[str, str], ...]:

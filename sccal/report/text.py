@@ -19,6 +19,9 @@ from sccal.report.summary import (
     notice_text,
     outage_line,
     recoveries_line,
+    reference_lines,
+    unseen_in_all,
+    unseen_line,
 )
 from sccal.report.verdict import run_verdict, vehicle_verdict
 
@@ -45,6 +48,8 @@ def run_text(c: Calibration, width: int = 100) -> str:
         *_labelled("heading", [headings_line(c.fit)], width),
         *_labelled("filter", [recoveries_line(c.fit)], width),
         *_labelled("outage", [outage_line(c.outage)], width),
+        *_labelled("losses", reference_lines(c.against_reference), width),
+        *_labelled("unseen", [unseen_line(c.unseen)], width),
         *_labelled("noise", _noise(c.noise), width),
         *_labelled("clock", [clock_line(c.clock)], width),
         *_labelled("notices", _notice_lines([("", n) for n in c.notices], "calibration.json"), width),
@@ -74,6 +79,16 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
         *_labelled("heading", [headings_line(v.fit)], width),
         *_labelled("filter", [recoveries_line(v.fit)], width),
         *_labelled("outage", [outage_line(v.outage)], width),
+        *_labelled(
+            "losses",
+            [
+                f"{shortened(one_line(c.run), 40)}: {line}"
+                for c in v.runs
+                for line in reference_lines(c.against_reference)
+            ],
+            width,
+        ),
+        *_labelled("unseen", [unseen_line(unseen_in_all([c.unseen for c in v.runs]))], width),
         *_labelled("notices", _notice_lines(notices, "the runs' calibration.json"), width),
     ]
     return "\n".join(lines) + "\n"
