@@ -33,6 +33,10 @@ FIX_RATE_HZ = 5.0
 MAX_CLIMBS = 3
 WORTH_ANOTHER_CLIMB = 5.0
 SETTLED_HILLS = 3
+WANDERS = 3.0
+CLOSE_TOPS = 20.0
+"""Nats within which a thinned log does not decide between two tops."""
+SAME_SLIP = 0.1
 FAST = (0, 3, 4, 6)
 """White heading, both levels of the fixes and slip, among Noise's fields: what a thinned log shows least well."""
 DIFFERENCE = 0.02
@@ -91,16 +95,21 @@ def estimate_noise(
     rough = first
     if rough is None:
         rough = likelihood.problem(coarse, likelihood.centre).at_centre(coarse_constants(aligned, start))
-    promising = likelihood.best_of(coarse, likelihood.hills(), rough)[:SETTLED_HILLS]
-    settled = [(likelihood.settled(coarse, hill, rough), hill) for hill in promising]
-    (cost, at), level = min(settled, key=lambda one: one[0][0])
-    for _ in range(MAX_CLIMBS):
-        level = likelihood.climb(coarse, level, at)
-        before = cost
-        cost, at = likelihood.settled(coarse, level, at)
-        if cost > before - WORTH_ANOTHER_CLIMB:
-            break
-    return likelihood.noise(likelihood.climb_smoothly(fine, level, at))
+    ordered = likelihood.best_of(coarse, likelihood.hills(), rough)
+    cost, level, at = likelihood.climbed(coarse, ordered[:SETTLED_HILLS], rough)
+    if first is not None or not likelihood.wanders(level):
+        return likelihood.noise(likelihood.climb_smoothly(fine, level, at))
+    # Where the model lacks something, a thinned log hardly tells a heading that wanders from wheels that slip; all its
+    # measurements do.
+    far = [hill for hill in ordered if abs(hill[6] - ordered[0][6]) > SAME_SLIP]
+    tops = [(cost, level, at), likelihood.climbed(coarse, far[:SETTLED_HILLS], rough)]
+    least = min(cost for cost, _, _ in tops)
+    ends = []
+    for cost, level, at in tops:
+        if cost < least + CLOSE_TOPS:
+            end = likelihood.climb_smoothly(fine, level, at)
+            ends.append((likelihood.settled(fine, end, at)[0], end))
+    return likelihood.noise(min(ends, key=lambda one: one[0])[1])
 
 
 class _Likelihood:
@@ -166,6 +175,22 @@ class _Likelihood:
         """The points in order of their cost at the given constants."""
         cost = self._cost_at(timeline, points[0], at)
         return sorted(points, key=cost)
+
+    def wanders(self, logs: Floats) -> bool:
+        """Whether the fixes err slowly by more than receivers do: the path is not what the model says."""
+        return bool(logs[4] > np.log(WANDERS * self.fix_sigma_m))
+
+    def climbed(self, timeline: Timeline, hills: list[Floats], at: At) -> tuple[float, Floats, At]:
+        """From the best of the hills to the top: cost, levels, and the constants fitted to them."""
+        settled = [(self.settled(timeline, hill, at), hill) for hill in hills]
+        (cost, at), level = min(settled, key=lambda one: one[0][0])
+        for _ in range(MAX_CLIMBS):
+            level = self.climb(timeline, level, at)
+            before = cost
+            cost, at = self.settled(timeline, level, at)
+            if cost > before - WORTH_ANOTHER_CLIMB:
+                break
+        return cost, level, at
 
     def climb(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
         """The most likely levels from a far starting point, the constants' linearisation fixed (Powell)."""
