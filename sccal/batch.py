@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,22 +15,17 @@ from sccal.calibration.single import calibrate_run
 from sccal.diagnose.diagnose import diagnose
 from sccal.diagnose.honest import with_honest_effects, with_honest_vehicle
 from sccal.diagnose.result import Diagnosis
-from sccal.errors import DataError, SccalError, UsageError
+from sccal.errors import DataError, Failure, SccalError, UsageError, as_known
+from sccal.experiments.experiments import run_experiments
+from sccal.experiments.result import Experiments
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import find_start
-from sccal.logs.run import RunSource, discover, read_run
+from sccal.logs.run import RunSource, find_runs, read_run
 from sccal.logs.streams import Vehicle
 from sccal.report.diagnosis_write import write_diagnosis
+from sccal.report.experiments_write import write_experiments
 from sccal.report.write import begin_loading, write_calibration, write_vehicle
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A run, or a path on the command line, that gave no result."""
-
-    name: str
-    error: SccalError
 
 
 @dataclass
@@ -42,23 +36,6 @@ class Batch:
     failures: list[Failure] = field(default_factory=list)
     vehicles: list[tuple[VehicleCalibration, Path]] = field(default_factory=list)
     """Each with the JSON file that was written."""
-
-
-def find_runs(paths: Sequence[Path]) -> tuple[list[RunSource], list[Failure]]:
-    """All runs below the paths; a path that holds none is a failure of its own, not of the others.
-
-    Raises UsageError where a path does not exist.
-    """
-    fruitful: list[Path] = []
-    failures: list[Failure] = []
-    for path in paths:
-        try:
-            discover([path])
-        except DataError as error:
-            failures.append(Failure(str(path), error))
-        else:
-            fruitful.append(path)
-    return (discover(fruitful) if fruitful else []), failures
 
 
 def calibrate_paths(
@@ -85,7 +62,7 @@ def calibrate_paths(
                 calibration = with_honest_effects(calibration, problem)
             write_calibration(calibration, out / source.name)
         except Exception as error:
-            known = error if isinstance(error, SccalError) else _as_known(error)
+            known = as_known(error)
             batch.failures.append(Failure(source.name, known))
             tell(source, known)
             continue
@@ -124,7 +101,7 @@ def diagnose_paths(
             aligned = align(read_run(source))
             find_start(aligned)
         except Exception as error:
-            failures.append(Failure(source.name, error if isinstance(error, SccalError) else _as_known(error)))
+            failures.append(Failure(source.name, as_known(error)))
             continue
         of_vehicle.setdefault(_identity(aligned.vehicle), []).append(aligned)
     diagnosed: list[tuple[Diagnosis, Path]] = []
@@ -136,16 +113,30 @@ def diagnose_paths(
             folder = out if len(of_vehicle) == 1 else out / _free_stem(_as_file_name(name), taken)
             write_diagnosis(diagnosis, folder)
         except Exception as error:
-            failures.append(Failure(name, error if isinstance(error, SccalError) else _as_known(error)))
+            failures.append(Failure(name, as_known(error)))
             continue
         diagnosed.append((diagnosis, folder / "diagnosis.html"))
     return diagnosed, failures
 
 
-def _as_known(error: Exception) -> SccalError:
-    """A bug in one run must not take the others with it: shown in full now, counted as internal at the end."""
-    traceback.print_exception(error)
-    return SccalError(f"internal error ({type(error).__name__}: {error}); please report it with the lines above")
+def experiment_on_paths(
+    paths: Sequence[Path],
+    out: Path,
+    seeds: int,
+    duration_s: float,
+    jobs: int | None,
+    tell: Callable[[str], None],
+) -> tuple[Experiments, Path, list[Failure]]:
+    """The paper's experiments on simulated drives and on the runs below the paths, written to out.
+
+    Returns what they gave, its page, and which paths and runs gave nothing.
+    """
+    sources, failures = find_runs(paths) if paths else ([], [])
+    _check_out(out, sources)
+    say_if_compiling()
+    done = run_experiments(seeds, duration_s, sources, jobs, tell)
+    failures += [Failure(one.name, DataError(one.reason)) for one in done.failed]
+    return done, write_experiments(done, out), failures
 
 
 def _identity(vehicle: Vehicle) -> tuple[object, ...]:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sccal import __version__
-from sccal.errors import Exit, SccalError, UsageError
+from sccal.errors import Exit, Failure, SccalError, UsageError
 
 if TYPE_CHECKING:
-    from sccal.batch import Failure
     from sccal.calibration.result import Calibration
+    from sccal.degrade.folder import DegradedRun
     from sccal.logs.run import RunSource
 
 app = typer.Typer(
@@ -89,6 +89,10 @@ def calibrate(
     effects: Annotated[
         str, typer.Option(help="Estimate these effects too, e.g. lever_arm,soft_iron (see `sccal effects`).")
     ] = "",
+    withhold: Annotated[
+        list[str] | None,
+        typer.Option(help="Withhold the fixes from 60 to 120 s, say, and tell how far the robot drifts (repeatable)."),
+    ] = None,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
     import numpy as np
@@ -96,6 +100,7 @@ def calibrate(
     from sccal.batch import calibrate_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.filter.options import FilterOptions
+    from sccal.logs.windows import parse_window
     from sccal.report.text import run_text, vehicle_text
 
     options = CalibrationOptions(
@@ -113,6 +118,7 @@ def calibrate(
         output_rate_hz=rate,
         heading_rate_hz=heading_rate,
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
+        withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
     batch = calibrate_paths(paths, out, options, _tell)
     width = _width()
@@ -214,6 +220,104 @@ def simulate(
     write_run(simulated, out)
     write_vehicle_file(chosen, out)
     print(f"a {path} of {duration:g} s in {out}/ (truth in {out / 'truth.json'})")
+
+
+@app.command()
+def degrade(
+    paths: Paths,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for the degraded runs, outside of the logs.", show_default=False)
+    ],
+    sigma: Annotated[float, typer.Option(help="White noise on the fixes, m per axis.")] = 0.0,
+    loss: Annotated[
+        list[str] | None, typer.Option(help="No fixes from 60 to 120 s, say, both included: 60:120 (repeatable).")
+    ] = None,
+    from_: Annotated[
+        float | None, typer.Option("--from", help="Start of sigma, multipath, outliers and quality, s.")
+    ] = None,
+    quality: Annotated[
+        int | None, typer.Option(help="GGA quality to write with it; without it, what the noise means.")
+    ] = None,
+    multipath: Annotated[float, typer.Option(help="Correlated noise on the fixes, m per axis.")] = 0.0,
+    tau: Annotated[float, typer.Option(help="Correlation time of --multipath, s.")] = 30.0,
+    outliers: Annotated[
+        float, typer.Option(help="Fraction of the fixes that jump by 5 to 50 m and claim what they claimed.")
+    ] = 0.0,
+    heading_drift: Annotated[
+        float, typer.Option(help="Drift of the AHRS yaw, degrees an hour, counter-clockwise positive.")
+    ] = 0.0,
+    encoder_dropout: Annotated[
+        float, typer.Option(help="Fraction of the encoder rows lost, in bursts of a few.")
+    ] = 0.0,
+    latency: Annotated[float, typer.Option(help="Fixes show where the antenna was so many seconds earlier.")] = 0.0,
+    seed: Annotated[int, typer.Option(help="Same seed, same bytes.")] = 0,
+    drop: Annotated[
+        bool, typer.Option("--drop", help="Leave lost fixes out instead of writing that there is none.")
+    ] = False,
+    gst: Annotated[bool, typer.Option("--gst", help="Add the noise to the sigmas in GST too.")] = False,
+) -> None:
+    """Write the runs below PATHS again with a fault, everything else byte for byte as it was."""
+    from sccal.degrade.faults import Faults
+    from sccal.degrade.paths import degrade_paths
+    from sccal.logs.windows import parse_window
+
+    faults = Faults(
+        sigma_m=sigma,
+        losses_s=tuple(parse_window(text) for text in loss or []),
+        from_s=from_,
+        quality=quality,
+        multipath_m=multipath,
+        tau_s=tau,
+        outliers=outliers,
+        heading_drift_deg_per_hour=heading_drift,
+        encoder_dropout=encoder_dropout,
+        latency_s=latency,
+        seed=seed,
+        drop=drop,
+        gst=gst,
+    )
+    degraded, failures = degrade_paths(paths, out, faults, _tell_degraded)
+    _tell_failures(failures, len(failures) + len(degraded))
+
+
+def _tell_degraded(source: RunSource, result: DegradedRun | SccalError) -> None:
+    if isinstance(result, SccalError):
+        print(f"{source.name}: not written", flush=True)
+        return
+    did = [f"{count} {what}" for what, count in result.fixes.items() if what not in ("before", "same") and count]
+    parts = [f"of {result.fixes['before']} fixes {', '.join(did)}"] if did else []
+    parts += [f"{count} rows of {name} left out" for name, count in result.rows_dropped.items()]
+    print(f"{source.name}: {'; '.join(parts) or 'written'} -> {result.folder}", flush=True)
+    for notice in result.notices:
+        print(f"  {notice}", flush=True)
+
+
+@app.command()
+def experiments(
+    paths: Annotated[
+        list[Path] | None, typer.Argument(help="Runs of yours to put the same faults into.", show_default=False)
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
+    seeds: Annotated[int, typer.Option(help="Simulated drives of each kind.", min=1, max=1000)] = 20,
+    duration: Annotated[float, typer.Option(help="Length of the simulated drives, s.", min=120.0)] = 600.0,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes; all cores without it.", min=1, show_default=False)
+    ] = None,
+) -> None:
+    """The paper's experiments: fixes lost or noised, with and without the heading offset as a state."""
+    from sccal.batch import experiment_on_paths
+    from sccal.report.experiments_text import experiments_text
+
+    done, page, failures = experiment_on_paths(paths or [], out, seeds, duration, jobs, _tell_line)
+    print()
+    print(experiments_text(done, _width()), end="")
+    print()
+    print(f"results in {out}/, report: {page}")
+    _tell_failures(failures, len(failures) + len({cell.path for cell in done.cells if cell.measured}))
+
+
+def _tell_line(line: str) -> None:
+    print(line, flush=True)
 
 
 @app.command()

@@ -5,6 +5,8 @@ A bug is anything that is not an SccalError; it keeps its traceback and exits wi
 
 from __future__ import annotations
 
+import traceback
+from dataclasses import dataclass
 from enum import IntEnum
 
 
@@ -41,3 +43,19 @@ class NothingMatchedError(SccalError):
     """A pattern or filter selected nothing."""
 
     exit_code = Exit.NOTHING_MATCHED
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A run, or a path on the command line, that gave no result."""
+
+    name: str
+    error: SccalError
+
+
+def as_known(error: Exception) -> SccalError:
+    """A bug in one run must not take the others with it: shown in full now, counted as internal at the end."""
+    if isinstance(error, SccalError):
+        return error
+    traceback.print_exception(error)
+    return SccalError(f"internal error ({type(error).__name__}: {error}); please report it with the lines above")

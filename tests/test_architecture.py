@@ -16,20 +16,23 @@ PACKAGE = Path(sccal.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
     {"errors", "arrays", "compiled"},
-    {"geodesy", "logs"},
-    {"align", "simulate"},
+    {"geodesy", "randomness", "logs"},
+    {"align", "simulate", "degrade"},
     {"effects"},
     {"filter"},
     {"calibration"},
-    {"diagnose"},
+    {"diagnose", "experiments"},
     {"report"},
     {"batch"},
     {"cli"},
 )
 """Ground floor first; a room imports from lower floors only."""
 FREE = {"__init__", "__main__"}
-MAY_IMPORT = {"simulate": {"errors", "arrays", "geodesy", "logs"}}
-"""Rooms that may use less than all the floors below: a simulator that shared the filter's code would prove nothing."""
+MAY_IMPORT = {
+    "simulate": {"errors", "arrays", "randomness", "geodesy", "logs"},
+    "degrade": {"errors", "arrays", "randomness", "geodesy", "logs"},
+}
+"""Rooms that may use less than all the floors below: what makes or spoils logs shares nothing with what learns."""
 MUST_NOT_IMPORT = {"report": {"scipy", "numba"}, "cli": {"numpy", "pandas", "numba", "scipy", "matplotlib"}}
 LONGEST_MODULE = 600
 NAMES_OF_NOTHING = {"utils", "util", "helpers", "helper", "common", "misc"}

@@ -127,7 +127,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     if simulated:
         notices.append(Notice("gnss", "fixes say they come from a simulator (quality 8)", simulated, "", "warning"))
     good &= _inside(np.where(good, t_s, np.nan), span, "gnss", notices)
-    judges = good & within(t_s, windows_on_clock(withhold_s, whole))
+    received_s = np.where(np.isfinite(fixes.host_t_s), fixes.host_t_s, t_s)
+    judges = good & within(received_s, windows_on_clock(withhold_s, whole))
     good_index = in_order(t_s, good & ~judges)
     if good_index.size < MIN_MEASUREMENTS:
         raise DataError(

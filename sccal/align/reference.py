@@ -68,15 +68,15 @@ def on_host_clock(
     if reference is None:
         return (*fixes_on_host_clock(fixes, span_s), np.zeros(0))
     there = fixes.lat_deg.size
-    whole = joined(fixes, taken(reference.fixes, np.flatnonzero(reference.lost)))
+    whole = joined(fixes, reference.fixes.take(np.flatnonzero(reference.lost)))
     order = np.argsort(np.where(np.isfinite(whole.utc_s), whole.utc_s, whole.host_t_s), kind="stable")
-    t_ordered, timed_ordered, clock = fixes_on_host_clock(taken(whole, order), span_s)
+    t_ordered, timed_ordered, clock = fixes_on_host_clock(whole.take(order), span_s)
     t_s, timed = np.empty(order.size), np.zeros(order.size, dtype=np.bool_)
     t_s[order], timed[order] = t_ordered, timed_ordered
     back = np.full(reference.lost.size, np.nan)
     back[reference.lost] = np.where(timed[there:], t_s[there:], np.nan)
     stays = np.flatnonzero(~reference.lost)
-    back[stays] = _times_of_same(taken(reference.fixes, stays), fixes, t_s[:there])
+    back[stays] = _times_of_same(reference.fixes.take(stays), fixes, t_s[:there])
     return t_s[:there], timed[:there], clock, back
 
 
@@ -135,20 +135,4 @@ def joined(one: FixStream, other: FixStream) -> FixStream:
         sigma_east_m=both("sigma_east_m"),
         sigma_north_m=both("sigma_north_m"),
         cov_en_m2=both("cov_en_m2"),
-    )
-
-
-def taken(stream: FixStream, rows: Ints) -> FixStream:
-    """Only the fixes at the indices ``rows``, without further columns."""
-    return FixStream(
-        host_t_s=stream.host_t_s[rows],
-        utc_s=stream.utc_s[rows],
-        utc_has_date=stream.utc_has_date,
-        lat_deg=stream.lat_deg[rows],
-        lon_deg=stream.lon_deg[rows],
-        alt_m=stream.alt_m[rows],
-        quality=stream.quality[rows],
-        sigma_east_m=stream.sigma_east_m[rows],
-        sigma_north_m=stream.sigma_north_m[rows],
-        cov_en_m2=stream.cov_en_m2[rows],
     )

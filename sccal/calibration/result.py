@@ -229,6 +229,8 @@ class Calibration:
     notices: tuple[Notice, ...]
     """Everything that readers, alignment and filter had to repair, drop or doubt."""
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    on_the_way: Trajectory | None = None
+    """Where the forward filter believed the robot to be at the time, before it knew what came later."""
     against_reference: AgainstReference | None = None
     """None where all fixes teach and were never displaced."""
     unseen: tuple[Unseen, ...] = ()

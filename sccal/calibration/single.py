@@ -88,6 +88,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
             notices=(*aligned.notices, *_doubts(problem, final)),
             effects=_effects(problem, values[4:], covariance[4:, 4:]),
+            on_the_way=_trajectory(honest),
             against_reference=judged,
             unseen=unseen_parameters(problem, values),
         ),

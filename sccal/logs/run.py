@@ -8,11 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sccal.errors import DataError, UsageError
+from sccal.errors import DataError, Failure, UsageError
 from sccal.logs.ahrs import read_ahrs
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
 from sccal.logs.nmea import read_nmea
+from sccal.logs.reference import read_reference
 from sccal.logs.streams import Notice, Run
 from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
 
@@ -58,6 +59,23 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     return _with_unique_names(found)
 
 
+def find_runs(paths: Sequence[Path]) -> tuple[list[RunSource], list[Failure]]:
+    """All runs below the paths; a path that holds none is a failure of its own, not of the others.
+
+    Raises UsageError where a path does not exist.
+    """
+    fruitful: list[Path] = []
+    failures: list[Failure] = []
+    for path in paths:
+        try:
+            discover([path])
+        except DataError as error:
+            failures.append(Failure(str(path), error))
+        else:
+            fruitful.append(path)
+    return (discover(fruitful) if fruitful else []), failures
+
+
 def read_run(source: RunSource) -> Run:
     """Read a run's vehicle, wheels, heading and fixes, with the notices of all readers.
 
@@ -98,6 +116,7 @@ def read_run(source: RunSource) -> Run:
         heading=heading,
         fixes=fixes,
         notices=(*notices, *wheel_notices, *heading_notices, *fix_notices),
+        reference=read_reference(source.path, fixes),
     )
 
 

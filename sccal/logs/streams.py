@@ -7,13 +7,14 @@ columns of a file ride along in ``extras`` (name to float array of length n, NaN
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from sccal.arrays import Bools, Floats, Ints
 
 Convention = Literal["enu", "ned"]
+_NO_ARRAYS = ("utc_has_date", "extras")
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,15 @@ class FixStream:
     cov_en_m2: Floats
     """East-north covariance stated by the log; 0 where not stated."""
     extras: Mapping[str, Floats] = field(default_factory=dict)
+
+    def take(self, rows: Ints) -> FixStream:
+        """Only the fixes at the indices ``rows``."""
+        cut: dict[str, Any] = {
+            one.name: array[rows]
+            for one in fields(self)
+            if one.name not in _NO_ARRAYS and (array := getattr(self, one.name)) is not None
+        }
+        return replace(self, **cut, extras={name: column[rows] for name, column in self.extras.items()})
 
 
 @dataclass(frozen=True)

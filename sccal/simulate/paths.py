@@ -16,7 +16,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.errors import UsageError
-from sccal.simulate.noise import random_stream
+from sccal.randomness import random_stream
 from sccal.simulate.settings import DriveSettings, PathName
 from sccal.simulate.world import BodySteps
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.geodesy import TangentPlane
-from sccal.simulate.noise import gauss_markov, in_order, random_stream
+from sccal.randomness import gauss_markov, random_stream
+from sccal.simulate.noise import in_order
 from sccal.simulate.physics import Physics, Sensor
 from sccal.simulate.settings import AhrsSettings, ClockSettings, EncoderSettings, GnssSettings
 from sccal.simulate.world import Motion, State, WheelPair

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.simulate.noise import random_stream, random_walk
+from sccal.randomness import random_stream, random_walk
 from sccal.simulate.settings import VehicleSettings
 
 

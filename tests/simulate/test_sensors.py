@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.simulate.noise import gauss_markov, in_order, random_stream
+from sccal.randomness import gauss_markov, random_stream
+from sccal.simulate.noise import in_order
 from sccal.simulate.physics import Physics
 from sccal.simulate.run import simulate_run
 from sccal.simulate.sensors import ahrs_reading_deg, origin, wrap_counter

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.simulate.noise import random_stream, random_walk
+from sccal.randomness import random_stream, random_walk
 from sccal.simulate.run import simulate_run
 from sccal.simulate.settings import (
     PATH_NAMES,

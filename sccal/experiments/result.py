@@ -1,0 +1,90 @@
+"""What the experiments gave: everything that their page, table and JSON need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sccal.arrays import Bools, Floats
+from sccal.calibration.result import Status
+from sccal.experiments.plan import Experiment, Variant
+from sccal.experiments.trial import Trial
+
+PARAMETERS = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_deg")
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A figure over several seeds."""
+
+    median: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class VariantFigures:
+    """One variant in one cell, seed by seed (s,)."""
+
+    rms_m: Floats
+    """Position error while the fault lasted, root mean square."""
+    end_m: Floats
+    """Position error at the end of the fault."""
+    values: Floats
+    """(s, 4) final PARAMETERS; the offset in degrees."""
+    sigmas: Floats
+    statuses: tuple[tuple[Status, ...], ...]
+    """Per seed, of the four."""
+    error_over_time_m: tuple[Floats, Floats, Floats]
+    """Median, 5th and 95th percentile over the seeds (n,), at Cell.t_s."""
+    rms_spread_m: Spread
+    """Median and 5th to 95th percentile of rms_m."""
+    end_spread_m: Spread
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One drive under one fault, all seeds."""
+
+    experiment: Experiment
+    path: str
+    """The drive's name, or the run's."""
+    measured: bool
+    seeds: tuple[int, ...]
+    t_s: Floats
+    """(n,) from the start of the run."""
+    judged: Bools
+    """(n,) while the fault lasts."""
+    figures: Mapping[Variant, VariantFigures]
+    ratio: Spread
+    """rms without the offset state over rms with it: geometric mean and its 95 % interval (Student's t on the seeds'
+    logarithms); the mean alone, low and high not finite, with one seed."""
+    truth: tuple[float, float, float, float] | None
+    """True PARAMETERS, the offset in degrees; for a measured run those of its undisturbed calibration."""
+    errors_percent: Floats
+    """(s, 3) of R_r, R_l and L with the offset state, (value − truth) / truth; empty without truth."""
+    within_percent: int
+    """Seeds in which all three are within TOLERANCE_PERCENT of the truth."""
+    why_not: str
+    """Why some are not; empty where all are."""
+    shown: Trial
+    """The first seed in full."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A run, or a run under one fault, that gave nothing."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Experiments:
+    """All cells: simulated drives first, then the runs that were given."""
+
+    cells: tuple[Cell, ...]
+    duration_s: float
+    """Of the simulated drives."""
+    seeds: tuple[int, ...]
+    failed: tuple[Failed, ...] = ()
