@@ -67,40 +67,47 @@ def read_decimals(data: Bytes, begin: Ints, end: Ints) -> Decimals:
     first = data[np.minimum(begin, data.size - 1)]
     signed = ((first == ord("-")) | (first == ord("+"))) & (length > 0)
     negative = signed & (first == ord("-"))
-    fits = (length > 0) & (length <= _LONGEST)
-    begin = begin + signed
-    length = np.where(fits, length - signed, 0)
+    length = np.where(length <= _LONGEST, length, 0)
+    if signed.any():
+        begin, length = begin + signed, np.maximum(length - signed, 0)
     words = words_of(data)
     left = np.flatnonzero(length > 0)
-    for _ in range(_MOST_LAYOUTS):
+    for attempt in range(_MOST_LAYOUTS):
         if left.size == 0:
             break
         typical = left[left.size // 2]
         size = int(length[typical])
         text = data[begin[typical] : begin[typical] + size].tobytes()
         point = text.find(b".")
-        same = length[left] == size
+        everywhere = attempt == 0 and left.size == n
+        at = begin if everywhere else begin[left]
+        same = (length if everywhere else length[left]) == size
         if point >= 0:
-            same &= data[begin[left] + point] == _POINT
-        rows, left = (left, left[:0]) if same.all() else (left[same], left[~same])
+            same &= data[at + point] == _POINT
+        rows: Ints | slice
+        if same.all():
+            rows, left = (slice(None) if everywhere else left), left[:0]
+        else:
+            rows, at, left = left[same], at[same], left[~same]
         before, after = (size, 0) if point < 0 else (point, size - point - 1)
         if before + after > _MOST_DIGITS:
-            _one_by_one(data, rows, begin, length, mantissa, places, good)
+            _one_by_one(data, np.arange(n)[rows], begin, length, mantissa, places, good)
             continue
-        whole, clean = _digits(words, begin[rows], before, None)
+        whole, clean = _digits(words, at, before, None)
         if point >= 0:
-            whole, also = _digits(words, begin[rows] + point + 1, after, whole)
+            whole, also = _digits(words, at + (point + 1), after, whole)
             clean &= also
         elif not clean.all():
-            left = np.concatenate((rows[~clean], left))
+            left = np.concatenate((np.arange(n)[rows][~clean], left))
         mantissa[rows], places[rows], good[rows] = whole, after, clean & (before + after > 0)
     if left.size:
         _one_by_one(data, left, begin, length, mantissa, places, good)
-    mantissa = np.where(negative, -mantissa, mantissa)
-    exact = np.where(good, mantissa / _POWERS[places], np.nan)
+    exact = mantissa / _POWERS[places]
+    if not good.all():
+        exact[~good] = np.nan
     if negative.any():
-        exact = np.where(negative & (mantissa == 0) & good, -0.0, exact)
-    for row in np.flatnonzero(good & (np.abs(mantissa) >= _EXACT)):
+        mantissa, exact = np.where(negative, -mantissa, mantissa), np.where(negative, -exact, exact)
+    for row in np.flatnonzero(good & (np.abs(mantissa) >= _EXACT)).tolist():
         magnitude = float(data[begin[row] : begin[row] + length[row]].tobytes())
         exact[row] = -magnitude if negative[row] else magnitude
     return Decimals(mantissa, places, good, exact)

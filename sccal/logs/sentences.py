@@ -88,11 +88,11 @@ class Sentences:
     odd_prefix: Bools
     """True for the first sentence of a line that begins with something other than a number of seconds."""
     marks: Ints
-    """Places of all bytes that part fields or sentences (any length), and twice the buffer's size at the end."""
+    """Places of all bytes that part fields or sentences (any length), and twice the file's size at the end."""
     first_mark: Ints
     """Index into ``marks`` of each sentence's comma before field 1."""
     fields: Ints
-    """How many fields follow the address."""
+    """How many fields follow the address; 0 where the sentence is longer than any."""
 
     def take(self, rows: Ints) -> Sentences:
         """Only the sentences at the indices ``rows``."""
@@ -137,11 +137,13 @@ class Sentences:
 
     def span(self, field: int) -> tuple[Ints, Ints]:
         """Where field ``field`` (from 1) begins and ends in the buffer; empty where the sentence has not that many."""
-        last = self.marks.size - 1
         mark = self.first_mark + (field - 1)
-        begin = np.minimum(self.marks[np.minimum(mark, last)] + 1, self.stop)
-        end = np.minimum(self.marks[np.minimum(mark + 1, last)], self.stop)
-        return begin, np.maximum(begin, end)
+        short = self.fields < field
+        if not short.any():
+            return self.marks[mark] + 1, self.marks[mark + 1]
+        mark = np.where(short, 0, mark)
+        begin = np.where(short, self.stop, self.marks[mark] + 1)
+        return begin, np.where(short, self.stop, self.marks[mark + 1])
 
 
 def kinds_in(kind: Kinds, wanted: Sequence[Kind]) -> Bools:
@@ -162,8 +164,9 @@ def find_sentences(raw: bytes) -> Sentences:
     data = np.frombuffer(raw + bytes(PAD), dtype=np.uint8)
     body = data[:size]
     marked = body == ord(",")
+    same = np.empty_like(marked)
     for byte in b"*$\r\n":
-        marked |= body == byte
+        marked |= np.equal(body, byte, out=same)
     marks = np.append(np.flatnonzero(marked), (size, size))
     mark_byte = data[marks]
     major = np.flatnonzero(mark_byte != ord(","))
@@ -206,7 +209,7 @@ def find_sentences(raw: bytes) -> Sentences:
         odd_prefix=odd_prefix,
         marks=marks,
         first_mark=first_mark,
-        fields=np.maximum(mark_of_stop - first_mark, 0),
+        fields=np.where(marks[mark_of_stop] > stop, 0, np.maximum(mark_of_stop - first_mark, 0)),
     )
 
 
