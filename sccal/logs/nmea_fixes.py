@@ -246,8 +246,10 @@ def _one_receiver(dated: Dated, positions: _Positions, source: str, notices: lis
             continue
         what = f"{name} fixes of talker {names[0]} dropped: their epochs were seen before, from {names[1]}"
         if apart_m <= _SAME_PLACE_M:
-            notices.append(Notice(source, what, int(beside.sum()), where))
-            keep[own[~beside]] = True
+            again = np.isin(epoch_key(dated.running_s[other.rows]), epoch_key(dated.running_s[best.rows]))
+            if again.any():
+                notices.append(Notice(source, what, int(again.sum()), where))
+            keep[own[~again]] = True
         else:
             what += f", {apart_m:.2f} m away: two receivers, or two solutions of one"
             notices.append(Notice(source, what, own.size, where, "warning"))
