@@ -161,7 +161,7 @@ def _mend_steps(sentences: Sentences, running_s: Floats, timed: Ints, source: st
         if with_host:
             delay_s = host_s - running_s[timed]
             lost_s = float(np.nanmedian(delay_s[after]) - np.nanmedian(delay_s[before]))
-            ours = step < 0 or abs(step - usual_s) > abs(host_step - usual_s)
+            ours = step < 0 or abs(step - usual_s) > abs(host_step - usual_s) or min(step, lost_s) > 3 * usual_s
         else:
             lost_s, ours = usual_s - step, True
         whole = round(lost_s)

@@ -121,6 +121,15 @@ def test_a_pause_of_whole_seconds_is_no_step_of_utc() -> None:
     assert not notices
 
 
+def test_leap_seconds_learnt_in_a_pause_are_mended() -> None:
+    times_s = NOON_S + np.concatenate((np.arange(50), np.arange(90, 140)))
+    stated_s = times_s + np.where(times_s < NOON_S + 60, 18.0, 0.0)
+    pairs = zip(times_s, stated_s, strict=True)
+    stream, notices = read([date(NOON_S), *(f"{own - NOON_S + 7.02:.3f} {fix(stated)}" for own, stated in pairs)])
+    np.testing.assert_allclose(stream.utc_s, times_s, atol=1e-6)
+    assert "-18 s" in told(notices, "leap seconds").what
+
+
 @pytest.mark.parametrize("step_s", [3.0, -5.0])
 def test_a_logging_clock_that_steps_is_not_blamed_on_the_receiver(step_s: float) -> None:
     times_s = NOON_S + 0.1 * np.arange(100)
