@@ -88,7 +88,12 @@ def pashr(
 
 
 def avr(
-    utc_s: float, compass_deg: float, tilt_deg: float = 0.0, quality: int = 3, length_m: float = 1.2, across: bool = False
+    utc_s: float,
+    compass_deg: float,
+    tilt_deg: float = 0.0,
+    quality: int = 3,
+    length_m: float = 1.2,
+    across: bool = False,
 ) -> str:
     angles = f",,{tilt_deg:+.4f},Roll" if across else f"{tilt_deg:+.4f},Tilt,,"
     return sentence(f"PTNL,AVR,{clock(utc_s)},{compass_deg:+.4f},Yaw,{angles},{length_m:.3f},{quality},1.4,16")

@@ -213,8 +213,8 @@ def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStr
     first = max(int(np.searchsorted(wheels.t_s, heading.t_s[0], side="right")) - 1, 0)
     if wheels.t_s.size - first < MIN_MEASUREMENTS:
         raise DataError(
-            f"{heading.source} begins at {heading.t_s[0]:.3f} s, and only {wheels.t_s.size - first} encoder samples follow: "
-            "the streams must overlap for at least some seconds"
+            f"{heading.source} begins at {heading.t_s[0]:.3f} s, and only {wheels.t_s.size - first} encoder samples "
+            "follow: the streams must overlap for at least some seconds"
         )
     return WheelStream(
         wheels.t_s[first:],

@@ -132,9 +132,7 @@ def _digits(words: Words, at: Ints, count: int, start: Ints | None) -> tuple[Int
     return value, clean
 
 
-def _one_by_one(
-    data: Bytes, rows: Ints, begin: Ints, length: Ints, mantissa: Ints, places: Ints, good: Bools
-) -> None:
+def _one_by_one(data: Bytes, rows: Ints, begin: Ints, length: Ints, mantissa: Ints, places: Ints, good: Bools) -> None:
     """The same for texts of any layout, unsigned, written into the last three arrays at ``rows``."""
     for row in rows.tolist():
         text = data[begin[row] : begin[row] + length[row]].tobytes()

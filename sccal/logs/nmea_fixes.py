@@ -106,8 +106,8 @@ def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Positions |
             continue
         own: list[Notice] = []
         found.append((_usable(dated.sentences, one, rows_of[one], source, own), own))
-        enough = found[-1][0].rows.size
-        if enough and enough >= _LEAST_SHARE * max((rows_of[other].size for other in POSITION_KINDS[i + 1 :]), default=0):
+        others = max((rows_of[other].size for other in POSITION_KINDS[i + 1 :]), default=0)
+        if found[-1][0].rows.size >= max(1.0, _LEAST_SHARE * others):
             break
     if not found:
         return None
@@ -122,8 +122,8 @@ def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Positions |
         few = rows_of[Kind.GGA].size > 0
         why = f"only {found[0][0].rows.size} GGA can be used" if few else "there is no GGA"
         what = f"{KIND_NAMES[best.kind]} sentences read for their positions because {why}"
-        severity = "warning" if best.kind == Kind.RMC or few else "info"
-        notices.append(Notice(source, what, int(best.rows.size), severity=severity))
+        serious = best.kind == Kind.RMC or few
+        notices.append(Notice(source, what, int(best.rows.size), severity="warning" if serious else "info"))
     return best
 
 

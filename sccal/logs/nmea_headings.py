@@ -76,6 +76,8 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
         first = dated.sentences.line[readings.rows[~np.isfinite(t_s)][0]]
         what = "headings without an epoch of their own dropped"
         notices.append(Notice(name, what, int(t_s.size - timed.size), f"line {first}"))
+    if timed.size == 0:
+        return None
     order, order_notices = order_in_time(t_s[timed], dated.sentences.line[readings.rows[timed]], name)
     notices += order_notices
     chosen = timed[order]
@@ -176,8 +178,8 @@ _READERS: dict[Kind, Callable[[Sentences, Ints, str, list[Notice]], _Readings]] 
 
 def _best_quality(quality: Floats, name: str, own: Sentences, notices: list[Notice]) -> Bools:
     """The fixed headings, where at least a tenth are; else all that there are, told."""
-    some = quality > 0
-    fixed = quality == _FIXED
+    some: Bools = quality > 0
+    fixed: Bools = quality == _FIXED
     rest = some & ~fixed
     if fixed.sum() >= _LEAST_SHARE * some.sum():
         if rest.any():
@@ -238,9 +240,7 @@ def _one_talker(dated: Dated, readings: _Readings, name: str, notices: list[Noti
     return readings.take(keep)
 
 
-def _epochs(
-    dated: Dated, readings: _Readings, name: str, notices: list[Notice]
-) -> tuple[Floats | None, Floats]:
+def _epochs(dated: Dated, readings: _Readings, name: str, notices: list[Notice]) -> tuple[Floats | None, Floats]:
     """UTC of the readings' epochs (m,), None where they come by a clock of their own, and their receive times (m,).
 
     The receive times follow the epochs' own spacing, so that they increase; where the log has none they are UTC.

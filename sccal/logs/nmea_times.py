@@ -152,10 +152,11 @@ def _mend_steps(sentences: Sentences, running_s: Floats, timed: Ints, source: st
     forward = step_s[step_s > 0]
     usual_s = float(np.median(forward)) if forward.size else 0.0
     edges = np.concatenate(([0], borders, [timed.size]))
+    seen = np.isfinite(host_s) if with_host else np.ones(timed.size, dtype=np.bool_)
     for i, border in enumerate(borders.tolist()):
         before = slice(max(edges[i], border - _SIDE_ROWS), border)
         after = slice(border, min(edges[i + 2], border + _SIDE_ROWS))
-        if min(np.isfinite(host_s[side] if with_host else step_s[side]).sum() for side in (before, after)) < _FEWEST_ROWS:
+        if min(seen[before].sum(), seen[after].sum()) < _FEWEST_ROWS:
             continue
         step, host_step = float(step_s[border - 1]), float(host_step_s[border - 1])
         if with_host:
@@ -191,7 +192,7 @@ def _midnights(
     offset_s = np.round((day * DAY_S + tod_s[rows] - running_s[rows]) / DAY_S) * DAY_S
     if (offset_s == offset_s[0]).all():
         return none + offset_s[0], True
-    values, which, counts = np.unique(offset_s, return_inverse=True, return_counts=True)
+    _, which, counts = np.unique(offset_s, return_inverse=True, return_counts=True)
     rare = (counts < max(3.0, 0.05 * rows.size)) & (counts < counts.max())
     lost = rare[which]
     if lost.any():
@@ -234,13 +235,13 @@ def _days_of(own: Sentences, kind: Kind) -> Floats:
     if kind == Kind.KSXT:
         packed = stated.mantissa // (10**6 * _TEN_TO[np.minimum(stated.places, _MOST_PLACES)])
         return _days(packed % 100, packed // 100 % 100, packed // 10000, good & (packed >= 19800106))
-    first, second, year = stated.mantissa // 10000, stated.mantissa // 100 % 100, stated.mantissa % 100
-    year = year + np.where(year >= 80, 1900, 2000)
+    first, second, short = stated.mantissa // 10000, stated.mantissa // 100 % 100, stated.mantissa % 100
+    years = short + np.where(short >= 80, 1900, 2000)
     good &= stated.places == 0
     if kind == Kind.RMC:
-        return _days(first, second, year, good)
-    american = _days(second, first, year, good)
-    return american if np.isfinite(american).any() else _days(first, second, year, good)
+        return _days(first, second, years, good)
+    american = _days(second, first, years, good)
+    return american if np.isfinite(american).any() else _days(first, second, years, good)
 
 
 def _days(day: Ints, month: Ints, year: Ints, good: Bools) -> Floats:

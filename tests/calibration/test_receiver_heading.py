@@ -20,7 +20,7 @@ MAKE = {
     "hdt": lambda utc_s, compass: hdt(compass),
     "ths": lambda utc_s, compass: ths(compass),
     "pashr": pashr,
-    "avr": lambda utc_s, compass: avr(utc_s, compass),
+    "avr": avr,
     "ksxt": lambda utc_s, compass: ksxt(utc_s, quality=0, compass_deg=compass),
 }
 

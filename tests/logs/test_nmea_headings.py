@@ -178,9 +178,7 @@ def test_a_kind_that_comes_seldom_does_not_hide_one_that_comes_often() -> None:
 
 
 def test_one_talker_of_two_is_read() -> None:
-    heading, notices = read(
-        log(lambda i: hdt(compass(i)), lambda i: hdt(90.0, "HE") if i % 2 else sentence("GPGSV,1"))
-    )
+    heading, notices = read(log(lambda i: hdt(compass(i)), lambda i: hdt(90.0, "HE") if i % 2 else sentence("GPGSV,1")))
     np.testing.assert_allclose(np.degrees(heading.yaw_rad), [compass(i) for i in range(40)], atol=1e-9)
     assert told(notices, "talker HE").severity == "warning"
 
