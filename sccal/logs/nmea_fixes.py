@@ -40,8 +40,6 @@ network RTK fixed, 10 OmniSTAR HP, 11 OmniSTAR VBS, 12 location RTK, 13 beacon D
 _KSXT_QUALITY = np.array([0, 1, 5, 4])
 _BEST_FIRST = (4, 5, 2, 9, 3, 1, -1, 8, 6, 7)
 _KNOT_MPS = 1852.0 / 3600.0
-_TEN_TO = 10 ** np.arange(19, dtype=np.int64)
-_MOST_PLACES = 14
 _LEAST_SHARE = 0.1
 _SAME_PLACE_M = 0.05
 _METRES_PER_DEG = 111_320.0
@@ -196,16 +194,14 @@ def _position(fixes: Sentences, field: int) -> tuple[Floats, Floats, Bools]:
 
 
 def _angle(fixes: Sentences, field: int, positive: int, negative: int, limit_deg: float) -> tuple[Floats, Bools]:
-    """Degrees of a packed ``dddmm.mmmm``, whose minutes are rounded once; and where the field is empty."""
+    """Degrees of a packed ``dddmm.mmmm``, to 1e-14; and where the field is empty."""
     begin, end = fixes.span(field)
-    packed = fixes.decimals(field)
+    packed = parse_decimals(fixes.data, begin, end)
     side = fixes.letter(field + 1)
-    places = np.minimum(packed.places, _MOST_PLACES)
-    degrees, minutes = np.divmod(packed.mantissa, 100 * _TEN_TO[places])
-    minutes_deg = minutes / _TEN_TO[places] / 60
-    value = degrees + minutes_deg
-    good = packed.good & (packed.places == places) & (packed.mantissa >= 0) & (minutes_deg < 1) & (value <= limit_deg)
-    good &= (side == positive) | (side == negative)
+    degrees = np.floor(packed / 100)
+    minutes = packed - degrees * 100
+    value = degrees + minutes / 60
+    good = (minutes < 60) & (value <= limit_deg) & (packed >= 0) & ((side == positive) | (side == negative))
     return np.where(good, np.where(side == negative, -value, value), np.nan), begin == end
 
 
