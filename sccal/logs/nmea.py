@@ -1,7 +1,8 @@
 """``gnss.nmea``: what receivers write, as fixes and, where there is no ahrs.csv, as headings.
 
 Only sentences whose checksum is right are used, or which have none and are otherwise whole. Times and dates are found
-in ``nmea_times``, positions in ``nmea_fixes``, headings in ``nmea_headings``.
+in ``nmea_times``, fixes in ``nmea_fixes`` (from ``nmea_positions`` and ``nmea_receivers``), headings in
+``nmea_headings``.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.logs.nmea_fixes import KIND_NAMES
+from sccal.logs.nmea_positions import KIND_NAMES
 from sccal.logs.nmea_times import UNTIMED, Dated, epoch_key, epochs_of_untimed
 from sccal.logs.sentences import Kind, Sentences, talker_name
 from sccal.logs.streams import HeadingStream, Notice
