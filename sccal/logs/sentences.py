@@ -7,7 +7,7 @@ over. Only the places of the bytes ``$ , * \\r \\n`` are looked at; fields are r
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -21,6 +21,7 @@ Kinds = NDArray[np.uint8]
 
 _LONGEST_SENTENCE = 512
 _LONGEST_PREFIX = 64
+_PIECE = 2**17
 _HEX = np.full(256, 255, dtype=np.uint8)
 _HEX[np.frombuffer(b"0123456789ABCDEF", dtype=np.uint8)] = np.arange(16)
 _HEX[np.frombuffer(b"abcdef", dtype=np.uint8)] = np.arange(10, 16)
@@ -163,11 +164,7 @@ def find_sentences(raw: bytes) -> Sentences:
     size = len(raw)
     data = np.frombuffer(raw + bytes(PAD), dtype=np.uint8)
     body = data[:size]
-    marked = body == ord(",")
-    same = np.empty_like(marked)
-    for byte in b"*$\r\n":
-        marked |= np.equal(body, byte, out=same)
-    marks = np.append(np.flatnonzero(marked), (size, size))
+    marks = np.concatenate((*_marks(body), (size, size)))
     mark_byte = data[marks]
     major = np.flatnonzero(mark_byte != ord(","))
     byte = mark_byte[major]
@@ -211,6 +208,17 @@ def find_sentences(raw: bytes) -> Sentences:
         first_mark=first_mark,
         fields=np.where(marks[mark_of_stop] > stop, 0, np.maximum(mark_of_stop - first_mark, 0)),
     )
+
+
+def _marks(body: Bytes) -> Iterator[Ints]:
+    """Places of the bytes that part fields or sentences, in pieces that stay in the processor's cache."""
+    marked, same = np.empty(_PIECE, dtype=np.bool_), np.empty(_PIECE, dtype=np.bool_)
+    for begin in range(0, body.size, _PIECE):
+        piece = body[begin : begin + _PIECE]
+        found = np.equal(piece, ord(","), out=marked[: piece.size])
+        for byte in b"*$\r\n":
+            found |= np.equal(piece, byte, out=same[: piece.size])
+        yield np.flatnonzero(found) + begin
 
 
 def _upper(letters: Bytes) -> Bytes:
