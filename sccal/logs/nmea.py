@@ -13,10 +13,11 @@ import numpy as np
 
 from sccal.arrays import Bools
 from sccal.errors import DataError
+from sccal.logs.decimals import words_of
 from sccal.logs.nmea_fixes import read_fixes
 from sccal.logs.nmea_headings import HEADING_NAMES, read_heading
 from sccal.logs.nmea_times import Dated, date_sentences
-from sccal.logs.sentences import Kind, Sentences, find_sentences
+from sccal.logs.sentences import Kind, Sentences, all_lower, find_sentences
 from sccal.logs.streams import FixStream, HeadingStream, Notice
 
 _FIELDS_NEEDED = {
@@ -113,7 +114,7 @@ def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Se
     ours = found.kind != Kind.OTHER
     wrong = found.has_checksum & ~found.right_checksum
     cut = ~found.has_checksum & ~found.complete
-    lower = found.data[found.start + 1] > ord("Z")
+    lower = (found.data[found.start + 1] > ord("Z")) & ~all_lower(words_of(found.data), found.start)
     short = ours & ~wrong & ~cut & ((found.fields < needed[found.kind]) | (~found.has_checksum & lower))
     use: Bools = ours & ~wrong & ~cut & ~short
     bare = use & ~found.has_checksum

@@ -56,6 +56,7 @@ def _pattern(text: bytes) -> tuple[np.uint64, np.uint64]:
     return _word(text), _word(bytes(0xDF if 65 <= letter <= 90 else 0xFF for letter in text))
 
 
+_SMALL = np.uint64(0x6060606060)
 _UPPER = np.uint64(0xDFDFDFDFDFDFDFDF)
 _PROPRIETARY = (Kind.PASHR, Kind.AVR, Kind.GGK, Kind.KSXT)
 _FORMATTERS = {_word(kind.name.encode()): kind for kind in Kind if kind not in (Kind.OTHER, *_PROPRIETARY)}
@@ -186,6 +187,9 @@ def find_sentences(raw: bytes) -> Sentences:
     has_checksum = (star + 2 < end) & (high < 16) & (low < 16)
     right = has_checksum & (_sums(data, start, stop) == high * 16 + low) & (stop > start + 1)
     right |= _with_long_checksum(raw, kind, has_checksum & ~right, start, star, end)
+    folded = np.flatnonzero(has_checksum & ~right & all_lower(words, start))
+    if folded.size:
+        right[folded] = _sums(_upper(data), start[folded], stop[folded]) == high[folded] * 16 + low[folded]
 
     newline = byte == (ord("\n") if b"\n" in raw else ord("\r"))
     line = np.cumsum(newline)[dollar] + 1
@@ -208,6 +212,12 @@ def find_sentences(raw: bytes) -> Sentences:
         first_mark=first_mark,
         fields=np.where(marks[mark_of_stop] > stop, 0, np.maximum(mark_of_stop - first_mark, 0)),
     )
+
+
+def all_lower(words: Words, start: Ints) -> Bools:
+    """Where a program has written the whole address in lower case; its checksum is that of capital letters."""
+    lower: Bools = (words[start + 1] & _SMALL) == _SMALL
+    return lower
 
 
 def _marks(body: Bytes) -> Iterator[Ints]:

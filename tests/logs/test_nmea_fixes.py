@@ -308,3 +308,24 @@ def test_fields_beyond_the_standard_are_passed_over() -> None:
     stream, notices = read([zda(NOON_S), *long])
     assert stream.quality.tolist() == [4] * 3
     assert not notices
+
+
+@pytest.mark.parametrize("whose", ["of capitals", "own", "none"])
+def test_a_log_in_lower_case_is_read(whose: str) -> None:
+    lines = [zda(NOON_S), *(fix(i) for i in range(5))]
+    if whose == "of capitals":
+        lines = [line.lower() for line in lines]
+    elif whose == "own":
+        lines = [sentence(line[1:].partition("*")[0].lower()) for line in lines]
+    else:
+        lines = [line.partition("*")[0].lower() for line in lines]
+    stream, _ = read(lines)
+    assert stream.quality.tolist() == [4] * 5
+    np.testing.assert_allclose(stream.lat_deg, [place(i)[0] for i in range(5)])
+
+
+def test_a_wrong_checksum_is_wrong_in_lower_case_too() -> None:
+    lines = [fix(0).lower(), fix(1).lower().replace("5206", "5207"), fix(2).lower()]
+    stream, notices = read([zda(NOON_S), *lines])
+    assert stream.lat_deg.size == 2
+    assert told(notices, "wrong checksum").count == 1
