@@ -3,7 +3,8 @@
 All are clockwise from true north ("ned"). Sources of fields and signs:
 
 * HDT: NMEA 0183; heading, T.
-* THS: IEC 61162-1; heading, mode: A autonomous; E estimated, M manual, S simulator and V void are not measurements.
+* THS: IEC 61162-1; heading, mode: A autonomous (and D, P, R, F as in RMC, or nothing); E estimated, M manual,
+  S simulator and V void are not measurements.
 * PASHR: Applanix POS MV V5 guide, table 20; NovAtel OEM7 and Trimble receiver help: time, heading, T, roll, pitch,
   heave, sigmas of roll, pitch and heading, quality (0 is none everywhere, the other numbers differ), status of the
   gyros. Roll is positive to starboard, the left side up, and pitch bow up (OxTS NMEA description; QPS driver manual,
