@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from sccal.align import align, build_timeline
@@ -16,7 +17,9 @@ from sccal.calibration.options import CalibrationOptions
 from sccal.filter.forward import Noise
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import find_start
+from sccal.logs.nmea import parse_nmea, parse_nmea_heading
 from sccal.logs.run import discover, read_run
+from sccal.logs.write import gga, gst, rmc
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.run import simulate_run
@@ -39,6 +42,31 @@ def timed(what: Callable[[], object], repeats: int = REPEATS) -> tuple[float, fl
 
 def show(name: str, times: tuple[float, float, float], note: str = "") -> None:
     print(f"{name:<44}{times[0]:8.3f}{times[1]:8.3f}{times[2]:8.3f}  {note}", flush=True)
+
+
+def hour_of_nmea(*further: Callable[[float], str]) -> bytes:
+    """GGA and RMC at 10 Hz after their receive times, and further sentences by their epoch."""
+    lines = []
+    for i in range(36_000):
+        utc_s = 1717243200.0 + 0.1 * i
+        here = 52.1 + 1e-7 * i, 5.3 - 2e-7 * i
+        sentences = [gga(utc_s, *here, 40.0, 4, 12, 0.6, 0.8), rmc(utc_s, *here, 1.0, 0.1 * i, "R")]
+        sentences += [make(utc_s) for make in further]
+        lines += [f"{utc_s + 0.02 + 0.001 * k:.4f} {sentence}\n" for k, sentence in enumerate(sentences)]
+    return "".join(lines).encode()
+
+
+def time_nmea() -> None:
+    """An hour of a receiver's lines, plain and with all that a heading receiver adds."""
+    from tests.receiver import hdt, ksxt, vtg
+
+    plain = hour_of_nmea()
+    rich = hour_of_nmea(lambda utc_s: gst(utc_s, 0.012, 0.015), lambda utc_s: vtg(90.0, 3.6), lambda utc_s: hdt(90.0))
+    ksxt_only = "".join(ksxt(1717243200.0 + 0.1 * i, compass_deg=90.0) + "\n" for i in range(36_000)).encode()
+    for name, raw in (("GGA, RMC", plain), ("GGA, RMC, GST, VTG, HDT", rich), ("KSXT", ksxt_only)):
+        show(f"fixes, 1 h of 10 Hz {name}", timed(partial(parse_nmea, raw, name)))
+    for name, raw in (("HDT", rich), ("KSXT", ksxt_only)):
+        show(f"headings, 1 h of 10 Hz {name}", timed(partial(parse_nmea_heading, raw, name)))
 
 
 def kernel_against_oracle(count: int = 2000) -> tuple[float, float]:
@@ -65,6 +93,7 @@ def main() -> None:
         write_vehicle_file(settings, folder)
         (source,) = discover([folder])
 
+        time_nmea()
         show("read one hour (100 Hz, 100 Hz, 5 Hz)", timed(lambda: read_run(source)))
         run = read_run(source)
         show("align it", timed(lambda: align(run)))

@@ -63,12 +63,12 @@ def _yaw_against_wheels(aligned: Aligned) -> list[Notice]:
     if len(apart) == judged and judged > 1:
         correlation = slope_through_origin(wheels[clear], yaw[clear]).correlation
         raise DataError(
-            f"ahrs.csv and encoder.csv do not turn together (correlation {correlation:+.2f} over {int(clear.sum())} s "
-            f"of turning): {advice}"
+            f"{aligned.heading_source} and encoder.csv do not turn together (correlation {correlation:+.2f} over "
+            f"{int(clear.sum())} s of turning): {advice}"
         )
     what = f"stretches of {CHUNK_S:.0f} s in which yaw and wheels do not turn together: {advice}"
     doubt = f"yaw and wheels do not turn together in {len(apart)} of {judged} minutes with turns"
-    return [Notice("ahrs.csv", what, len(apart), f"t = {apart[0]:.0f} s", "warning", doubt)]
+    return [Notice(aligned.heading_source, what, len(apart), f"t = {apart[0]:.0f} s", "warning", doubt)]
 
 
 def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:

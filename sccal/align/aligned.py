@@ -71,6 +71,10 @@ class Aligned:
     """The log's further columns by name; where two files share a name, the later one's carries its file's."""
     reference: ReferenceFixes | None = None
     """Fixes that judge and never teach; None where all fixes teach."""
+    heading_source: str = "ahrs.csv"
+    """Where the heading comes from, for messages."""
+    heading_convention: Convention | None = None
+    """Of the source, where it has one of its own; None where vehicle.toml declares it."""
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -109,7 +113,10 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     notices = list(run.notices)
     wheels, heading, fixes = run.wheels, run.heading, run.fixes
     whole = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
-    require_overlap(heading.t_s, whole, Clock("host", 0.0, 0.0, 0.0, 2), "ahrs.csv")
+    if heading.utc_s is not None:
+        fix_t_s, known, _, _ = on_host_clock(fixes, run.reference, whole)
+        heading = _on_the_fixes_clock(heading, heading.utc_s, fixes.utc_s[known], fix_t_s[known])
+    require_overlap(heading.t_s, whole, Clock("host", 0.0, 0.0, 0.0, 2), heading.source)
     wheels = _from_first_heading(wheels, heading)
     span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
 
@@ -136,10 +143,10 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
             f"at least {MIN_MEASUREMENTS} are needed: log longer, or check the receiver's fix quality"
         )
 
-    seen = _inside(heading.t_s, span, "ahrs.csv", notices)
+    seen = _inside(heading.t_s, span, heading.source, notices)
     if int(seen.sum()) < MIN_MEASUREMENTS:
         raise DataError(
-            f"ahrs.csv: {int(seen.sum())} readings within the wheels' span of {span[1] - span[0]:.1f} s, "
+            f"{heading.source}: {int(seen.sum())} readings within the wheels' span of {span[1] - span[0]:.1f} s, "
             f"at least {MIN_MEASUREMENTS} are needed"
         )
 
@@ -163,7 +170,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         left_rad=wheels.left_rad - wheels.left_rad[0],
         loose=wheels.loose,
         heading_t_s=heading.t_s[seen],
-        yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], run.vehicle.convention)),
+        yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], heading.convention or run.vehicle.convention)),
         yaw_sigma_rad=None if heading.yaw_sigma_rad is None else heading.yaw_sigma_rad[seen],
         pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
         roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
@@ -182,6 +189,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
             ("gnss", t_s[good_index], {name: values[good_index] for name, values in fixes.extras.items()}),
         ),
         reference=reference_fixes(withheld, span, plane),
+        heading_source=heading.source,
+        heading_convention=heading.convention,
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
@@ -198,13 +207,21 @@ def _further_columns(*streams: tuple[str, Floats, Mapping[str, Floats]]) -> dict
     return found
 
 
+def _on_the_fixes_clock(heading: HeadingStream, utc_s: Floats, fix_utc_s: Floats, fix_t_s: Floats) -> HeadingStream:
+    """The heading with its epochs (h,) on the logging clock by the mapping that puts the fixes' epochs (k,) there."""
+    if fix_utc_s.size == 0:
+        return heading
+    delay_s = np.interp(utc_s, fix_utc_s, fix_t_s - fix_utc_s)
+    return replace(heading, t_s=utc_s + delay_s, utc_s=None)
+
+
 def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStream:
     """The wheels from the last sample before the first heading on: nothing earlier says where the robot headed."""
     first = max(int(np.searchsorted(wheels.t_s, heading.t_s[0], side="right")) - 1, 0)
     if wheels.t_s.size - first < MIN_MEASUREMENTS:
         raise DataError(
-            f"ahrs.csv begins at {heading.t_s[0]:.3f} s, and only {wheels.t_s.size - first} encoder samples follow: "
-            "the streams must overlap for at least some seconds"
+            f"{heading.source} begins at {heading.t_s[0]:.3f} s, and only {wheels.t_s.size - first} encoder samples "
+            "follow: the streams must overlap for at least some seconds"
         )
     return WheelStream(
         wheels.t_s[first:],

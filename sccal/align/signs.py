@@ -141,8 +141,8 @@ def _check_turning(aligned: Aligned) -> None:
     swing, turned = float(np.ptp(aligned.yaw_rad)), float(np.ptp(wheel_turn(aligned, t_s)))
     if swing < STUCK_YAW_RAD and turned > STUCK_TURN_RAD:
         raise DataError(
-            f"ahrs.csv: the yaw stays within {np.degrees(swing):.2f}° while the wheels turn the robot by "
-            f"{np.degrees(turned):.0f}°: the AHRS is stuck, or the wrong column is called yaw"
+            f"{aligned.heading_source}: the yaw stays within {np.degrees(swing):.2f}° while the wheels turn the robot "
+            f"by {np.degrees(turned):.0f}°: the AHRS is stuck, or the wrong column is called yaw"
         )
     if np.abs(wheels).sum() < MIN_TURN_RAD or np.abs(yaw).sum() < MIN_TURN_RAD:
         return
@@ -150,7 +150,7 @@ def _check_turning(aligned: Aligned) -> None:
     if not yaw_on_wheels.opposed:
         return
 
-    convention = aligned.vehicle.convention
+    convention = aligned.heading_convention or aligned.vehicle.convention
     other = "ned" if convention == "enu" else "enu"
     wheels_fit = _turns_as_the_fixes_do(aligned, wheel_turn(aligned, aligned.wheel_t_s))
     yaw_fits = _turns_as_the_fixes_do(aligned, aligned.yaw_at_wheels_rad)
@@ -163,6 +163,8 @@ def _check_turning(aligned: Aligned) -> None:
         "backwards, negate both)"
     )
     mirrored = f'set convention = "{other}" under [ahrs] in vehicle.toml (it is "{convention}")'
+    if aligned.heading_convention is not None:
+        mirrored = f"the headings of {aligned.heading_source} do not turn clockwise from north: write an ahrs.csv"
     if wheels_fit is False and yaw_fits is not False:
         raise DataError(f"{seen}, and the path of the fixes sides with the AHRS: {swapped}")
     if yaw_fits is False and wheels_fit is not False:

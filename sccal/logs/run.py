@@ -12,9 +12,9 @@ from sccal.errors import DataError, Failure, UsageError
 from sccal.logs.ahrs import read_ahrs
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
-from sccal.logs.nmea import read_nmea
+from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.reference import read_reference
-from sccal.logs.streams import Notice, Run
+from sccal.logs.streams import HeadingStream, Notice, Run
 from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
 
 RUN_FILES = ("encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv")
@@ -84,6 +84,8 @@ def read_run(source: RunSource) -> Run:
     """
     there = [name for name in RUN_FILES if (source.path / name).is_file()]
     missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
+    if missing == ["ahrs.csv"] and "gnss.nmea" in there:
+        missing = []
     if not {"gnss.nmea", "gnss.csv"} & set(there):
         missing.append("gnss.nmea (or gnss.csv)")
     if missing:
@@ -98,8 +100,8 @@ def read_run(source: RunSource) -> Run:
     vehicle, notices = read_vehicle(source.vehicle_toml)
     wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)
     _require_rows(source.path / "encoder.csv", wheels.t_s.size, wheel_notices)
-    heading, heading_notices = read_ahrs(source.path / "ahrs.csv")
-    _require_rows(source.path / "ahrs.csv", heading.t_s.size, heading_notices)
+    heading, heading_notices = _read_heading(source.path, there)
+    _require_rows(source.path / heading.source, heading.t_s.size, heading_notices)
     if "gnss.nmea" in there:
         fixes, fix_notices = read_nmea(source.path / "gnss.nmea")
         if "gnss.csv" in there:
@@ -118,6 +120,18 @@ def read_run(source: RunSource) -> Run:
         notices=(*notices, *wheel_notices, *heading_notices, *fix_notices),
         reference=read_reference(source.path, fixes),
     )
+
+
+def _read_heading(folder: Path, there: Sequence[str]) -> tuple[HeadingStream, tuple[Notice, ...]]:
+    """From ahrs.csv; where there is none, from the receiver's own headings."""
+    if "ahrs.csv" in there:
+        return read_ahrs(folder / "ahrs.csv")
+    try:
+        return read_nmea_heading(folder / "gnss.nmea")
+    except DataError as error:
+        raise DataError(
+            f"{folder}: lacks ahrs.csv; found {', '.join(there)}, and no heading stands in for it: {error}"
+        ) from error
 
 
 def _require_rows(path: Path, usable: int, notices: Sequence[Notice]) -> None:

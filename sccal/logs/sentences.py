@@ -1,27 +1,69 @@
 """NMEA 0183 sentences in a byte buffer: found, checked and cut into fields with array operations.
 
 A sentence runs from ``$`` to a line end or the next ``$``; anything else between (binary messages, prompts) is passed
-over. Numbers are parsed as integer mantissa over a power of ten, so that they round as a decimal parser rounds.
+over. Only the places of the bytes ``$ , * \\r \\n`` are looked at; fields are read when they are asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import zlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.decimals import PAD, Bytes, Decimals, Words, parse_decimals, read_decimals, words_of
 
-Bytes = NDArray[np.uint8]
+Kinds = NDArray[np.uint8]
 
-_PAD = 64
-_LONGEST_NUMBER = 20
 _LONGEST_SENTENCE = 512
+_LONGEST_PREFIX = 64
+_PIECE = 2**17
 _HEX = np.full(256, 255, dtype=np.uint8)
 _HEX[np.frombuffer(b"0123456789ABCDEF", dtype=np.uint8)] = np.arange(16)
 _HEX[np.frombuffer(b"abcdef", dtype=np.uint8)] = np.arange(10, 16)
+_BETWEEN = np.isin(np.arange(256), np.frombuffer(b" \t\r,;:|=>])}\"'", dtype=np.uint8))
+_BEFORE = np.isin(np.arange(256), np.frombuffer(b" \t\r<[({\"'", dtype=np.uint8))
+
+
+class Kind(IntEnum):
+    """The sentences that are read, whatever their talker; the rest is OTHER."""
+
+    OTHER = 0
+    GGA = 1
+    GNS = 2
+    RMC = 3
+    VTG = 4
+    GST = 5
+    ZDA = 6
+    HDT = 7
+    THS = 8
+    PASHR = 9
+    AVR = 10
+    GGK = 11
+    KSXT = 12
+
+
+def _word(text: bytes) -> np.uint64:
+    return np.uint64(int.from_bytes(text, "little"))
+
+
+def _pattern(text: bytes) -> tuple[np.uint64, np.uint64]:
+    """Eight bytes to compare with, and the mask that first makes letters upper case and later bytes zero."""
+    return _word(text), _word(bytes(0xDF if 65 <= letter <= 90 else 0xFF for letter in text))
+
+
+_SMALL = np.uint64(0x6060606060)
+_UPPER = np.uint64(0xDFDFDFDFDFDFDFDF)
+_PROPRIETARY = (Kind.PASHR, Kind.AVR, Kind.GGK, Kind.KSXT)
+_FORMATTERS = {_word(kind.name.encode()): kind for kind in Kind if kind not in (Kind.OTHER, *_PROPRIETARY)}
+_NAMES = {Kind.PASHR: _pattern(b"PASHR,"), Kind.KSXT: _pattern(b"KSXT,"), Kind.GGK: _pattern(b"PTNLGGK,")}
+_TRIMBLE = _pattern(b"PTNL,")
+_TRIMBLE_NAMES = {Kind.AVR: _pattern(b"AVR,"), Kind.GGK: _pattern(b"GGK,")}
+"""In the field after the address ``$PTNL``."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +76,10 @@ class Sentences:
     """Place of the ``$``."""
     stop: Ints
     """Place after the last field: of the ``*``, or of the sentence's end."""
-    kind: NDArray[np.bytes_]
-    """The three letters after the talker, upper case; empty for what is not a five-letter address."""
+    kind: Kinds
+    """Of Kind."""
+    talker: NDArray[np.uint16]
+    """The two letters before the formatter, upper case, as one number (see talker_name); 0 for proprietary ones."""
     has_checksum: Bools
     right_checksum: Bools
     complete: Bools
@@ -43,14 +87,14 @@ class Sentences:
     line: Ints
     host_t_s: Floats
     """Time before the first ``$`` of the line; NaN where there is none."""
-    commas: Ints
-    """Places of all commas of the buffer (any length), and its size at the end."""
-    first_comma: Ints
-    """Index into ``commas`` of each sentence's first."""
-
-    def field_count(self) -> Ints:
-        """Commas in each sentence."""
-        return np.searchsorted(self.commas, self.stop) - self.first_comma
+    odd_prefix: Bools
+    """True for the first sentence of a line that begins with something other than a number of seconds."""
+    marks: Ints
+    """Places of all bytes that part fields or sentences (any length), and twice the file's size at the end."""
+    first_mark: Ints
+    """Index into ``marks`` of each sentence's comma before field 1."""
+    fields: Ints
+    """How many fields follow the address; 0 where the sentence is longer than any."""
 
     def take(self, rows: Ints) -> Sentences:
         """Only the sentences at the indices ``rows``."""
@@ -59,13 +103,16 @@ class Sentences:
             self.start[rows],
             self.stop[rows],
             self.kind[rows],
+            self.talker[rows],
             self.has_checksum[rows],
             self.right_checksum[rows],
             self.complete[rows],
             self.line[rows],
             self.host_t_s[rows],
-            self.commas,
-            self.first_comma[rows],
+            self.odd_prefix[rows],
+            self.marks,
+            self.first_mark[rows],
+            self.fields[rows],
         )
 
     def number(self, field: int) -> Floats:
@@ -73,133 +120,204 @@ class Sentences:
         begin, end = self.span(field)
         return parse_decimals(self.data, begin, end)
 
+    def decimals(self, field: int) -> Decimals:
+        """Field ``field`` (from 1) as a whole number over a power of ten."""
+        begin, end = self.span(field)
+        return read_decimals(self.data, begin, end)
+
     def letter(self, field: int) -> Bytes:
         """The only byte of field ``field`` (from 1), upper case; 0 where the field has not one byte."""
         begin, end = self.span(field)
-        letters = self.data[begin]
-        letters = np.where((letters >= 97) & (letters <= 122), letters - 32, letters)
+        letters = _upper(self.data[begin])
         return np.where(end - begin == 1, letters, 0).astype(np.uint8)
+
+    def letters(self, field: int, most: int) -> Bytes:
+        """The first ``most`` bytes of field ``field`` (from 1), upper case, (n, most); 0 after the field's end."""
+        begin, end = self.span(field)
+        place = np.minimum(begin[:, None] + np.arange(most), self.data.size - 1)
+        return np.where(place < end[:, None], _upper(self.data[place]), 0).astype(np.uint8)
 
     def span(self, field: int) -> tuple[Ints, Ints]:
         """Where field ``field`` (from 1) begins and ends in the buffer; empty where the sentence has not that many."""
-        last = self.commas.size - 1
-        comma = self.first_comma + (field - 1)
-        begin = self.commas[np.minimum(comma, last)] + 1
-        end = np.minimum(self.commas[np.minimum(comma + 1, last)], self.stop)
-        begin = np.minimum(begin, self.stop)
-        return begin, np.maximum(begin, end)
+        mark = self.first_mark + (field - 1)
+        short = self.fields < field
+        if not short.any():
+            return self.marks[mark] + 1, self.marks[mark + 1]
+        mark = np.where(short, 0, mark)
+        begin = np.where(short, self.stop, self.marks[mark] + 1)
+        return begin, np.where(short, self.stop, self.marks[mark + 1])
+
+
+def kinds_in(kind: Kinds, wanted: Sequence[Kind]) -> Bools:
+    """True where ``kind`` is one of ``wanted``."""
+    table = np.zeros(256, dtype=np.bool_)
+    table[list(wanted)] = True
+    return table[kind]
+
+
+def talker_name(talker: int) -> str:
+    """The two letters of a talker; empty for proprietary sentences."""
+    return bytes((talker & 255, talker >> 8)).decode("latin-1") if talker else ""
 
 
 def find_sentences(raw: bytes) -> Sentences:
     """Find every sentence of a file's bytes."""
     size = len(raw)
-    data = np.frombuffer(raw + bytes(_PAD), dtype=np.uint8)
+    data = np.frombuffer(raw + bytes(PAD), dtype=np.uint8)
     body = data[:size]
-    start = np.flatnonzero(body == ord("$"))
-    ends = np.flatnonzero((body == ord("\n")) | (body == ord("\r")) | (body == ord("$")))
-    ends = np.append(ends, size)
-    end = ends[np.searchsorted(ends, start, side="right")]
-    complete = (end < size) & (data[end] != ord("$"))
+    marks = np.concatenate((*_marks(body), (size, size)))
+    mark_byte = data[marks]
+    major = np.flatnonzero(mark_byte != ord(","))
+    byte = mark_byte[major]
+    dollar = np.flatnonzero(byte == ord("$"))
+    start = marks[major[dollar]]
+    starred = byte[dollar + 1] == ord("*")
+    mark_of_stop = major[dollar + 1]
+    stop = marks[mark_of_stop]
+    end_index = np.minimum(dollar + 1 + starred, major.size - 1)
+    end = marks[major[end_index]]
+    complete = (end < size) & (byte[end_index] != ord("$"))
     end = np.minimum(end, start + _LONGEST_SENTENCE)
+    star = np.where(starred, stop, size)
+    stop = np.minimum(stop, end)
 
-    stars = np.append(np.flatnonzero(body == ord("*")), size)
-    star = stars[np.searchsorted(stars, start)]
+    words = words_of(data)
+    kind, talker, shift = _kinds(words, start, stop)
     high, low = _HEX[data[np.minimum(star + 1, size)]], _HEX[data[np.minimum(star + 2, size)]]
     has_checksum = (star + 2 < end) & (high < 16) & (low < 16)
-    stop = np.where(star < end, star, end)
-    right = np.zeros(start.size, dtype=np.bool_)
-    if start.size:
-        bounds = np.column_stack((start + 1, np.maximum(stop, start + 2))).ravel()
-        sums = np.bitwise_xor.reduceat(data, bounds)[::2]
-        right = has_checksum & (sums == high * 16 + low) & (stop > start + 1)
+    right = has_checksum & (_sums(data, start, stop) == high * 16 + low) & (stop > start + 1)
+    right |= _with_long_checksum(raw, kind, has_checksum & ~right, start, star, end)
+    folded = np.flatnonzero(has_checksum & ~right & all_lower(words, start))
+    if folded.size:
+        right[folded] = _sums(_upper(data), start[folded], stop[folded]) == high[folded] * 16 + low[folded]
 
-    breaks = np.flatnonzero(body == (ord("\n") if b"\n" in raw else ord("\r")))
-    line_index = np.searchsorted(breaks, start)
-    commas = np.append(np.flatnonzero(body == ord(",")), size)
+    newline = byte == (ord("\n") if b"\n" in raw else ord("\r"))
+    line = np.cumsum(newline)[dollar] + 1
+    line_begin = np.maximum.accumulate(np.where(newline, marks[major] + 1, 0))[dollar]
+    host_t_s, odd_prefix = _host_times(data, start, line, line_begin)
+    first_mark = major[dollar] + 1 + shift
     return Sentences(
         data=data,
         start=start,
         stop=stop,
-        kind=_kinds(data, start, stop),
+        kind=_without_other_pashr(data, marks, first_mark, kind),
+        talker=talker,
         has_checksum=has_checksum,
         right_checksum=right,
         complete=complete | has_checksum,
-        line=line_index + 1,
-        host_t_s=_host_times(data, start, line_index, breaks),
-        commas=commas,
-        first_comma=np.searchsorted(commas, start),
+        line=line,
+        host_t_s=host_t_s,
+        odd_prefix=odd_prefix,
+        marks=marks,
+        first_mark=first_mark,
+        fields=np.where(marks[mark_of_stop] > stop, 0, np.maximum(mark_of_stop - first_mark, 0)),
     )
 
 
-def _kinds(data: Bytes, start: Ints, stop: Ints) -> NDArray[np.bytes_]:
-    address = data[start[:, None] + np.arange(1, 7)]
-    lower = (address >= 97) & (address <= 122)
-    address = np.where(lower, address - 32, address).astype(np.uint8)
-    letters = ((address[:, :5] >= 65) & (address[:, :5] <= 90)).all(axis=1)
-    usual = letters & (address[:, 5] == ord(",")) & (address[:, 0] != ord("P")) & (start + 6 < stop)
-    kinds = np.ascontiguousarray(address[:, 2:5]).view("S3").ravel()
-    return np.where(usual, kinds, b"").astype("S3")
+def all_lower(words: Words, start: Ints) -> Bools:
+    """Where a program has written the whole address in lower case; its checksum is that of capital letters."""
+    lower: Bools = (words[start + 1] & _SMALL) == _SMALL
+    return lower
 
 
-def _host_times(data: Bytes, start: Ints, line_index: Ints, breaks: Ints) -> Floats:
-    """The number before the first ``$`` of each sentence's line."""
+def _marks(body: Bytes) -> Iterator[Ints]:
+    """Places of the bytes that part fields or sentences, in pieces that stay in the processor's cache."""
+    marked, same = np.empty(_PIECE, dtype=np.bool_), np.empty(_PIECE, dtype=np.bool_)
+    for begin in range(0, body.size, _PIECE):
+        piece = body[begin : begin + _PIECE]
+        found = np.equal(piece, ord(","), out=marked[: piece.size])
+        for byte in b"*$\r\n":
+            found |= np.equal(piece, byte, out=same[: piece.size])
+        yield np.flatnonzero(found) + begin
+
+
+def _upper(letters: Bytes) -> Bytes:
+    return np.where((letters >= 97) & (letters <= 122), letters - np.uint8(32), letters)
+
+
+def _kinds(words: Words, start: Ints, stop: Ints) -> tuple[Kinds, NDArray[np.uint16], Ints]:
+    """Kind and talker of each sentence, and by how many fields its first one stands later than after the address."""
+    address = words[start + 1]
+    folded = address & _UPPER
+    sixth = (address >> np.uint64(40)) & np.uint64(255)
+    letters = folded & np.uint64(0xFFFF)
+    first, second = letters & np.uint64(255), letters >> np.uint64(8)
+    talks = (first >= 65) & (first <= 90) & (second >= 65) & (second <= 90) & (first != ord("P"))
+    usual = talks & (sixth == ord(",")) & (start + 6 < stop)
+    formatter = (folded >> np.uint64(16)) & np.uint64(0xFFFFFF)
+    kind = np.zeros(start.size, dtype=np.uint8)
+    for text, value in _FORMATTERS.items():
+        kind[usual & (formatter == text)] = value
+    talker = np.where(usual, letters, 0).astype(np.uint16)
+    shift = np.zeros(start.size, dtype=np.int64)
+    own = np.flatnonzero(~usual & (start + 6 < stop))
+    if own.size:
+        for name, pattern in _NAMES.items():
+            kind[own[_reads(address[own], pattern)]] = name
+        trimble = own[_reads(address[own], _TRIMBLE)]
+        for name, pattern in _TRIMBLE_NAMES.items():
+            rows = trimble[_reads(words[start[trimble] + 6], pattern)]
+            kind[rows], shift[rows] = name, 1
+    return kind, talker, shift
+
+
+def _reads(words: Words, pattern: tuple[np.uint64, np.uint64]) -> Bools:
+    text, mask = pattern
+    same: Bools = (words & mask) == text
+    return same
+
+
+def _sums(data: Bytes, start: Ints, stop: Ints) -> Bytes:
+    """Exclusive or of the bytes between ``$`` and stop."""
     if start.size == 0:
-        return np.empty(0)
-    first_of_line = np.concatenate(([True], np.diff(line_index) > 0))
+        return np.empty(0, dtype=np.uint8)
+    bounds = np.column_stack((start + 1, np.maximum(stop, start + 2))).ravel()
+    return np.asarray(np.bitwise_xor.reduceat(data, bounds)[::2])
+
+
+def _with_long_checksum(raw: bytes, kind: Kinds, wrong: Bools, start: Ints, star: Ints, end: Ints) -> Bools:
+    """True where a KSXT ends in the eight digits of a right CRC-32 instead of two, as ComNav receivers write it.
+
+    The remainder starts at 0 and is not inverted at the end, as in NovAtel's logs.
+    """
+    right = np.zeros(kind.size, dtype=np.bool_)
+    for row in np.flatnonzero(wrong & (kind == Kind.KSXT) & (star + 8 < end)).tolist():
+        try:
+            stated = int(raw[star[row] + 1 : star[row] + 9], 16)
+        except ValueError:
+            continue
+        right[row] = zlib.crc32(raw[start[row] + 1 : star[row]], 0xFFFFFFFF) ^ 0xFFFFFFFF == stated
+    return right
+
+
+def _without_other_pashr(data: Bytes, marks: Ints, first_mark: Ints, kind: Kinds) -> Kinds:
+    """PASHR that begins with a time is attitude; Ashtech receivers write other things under a name in its place."""
+    rows = np.flatnonzero(kind == Kind.PASHR)
+    named = _upper(data[marks[first_mark[rows]] + 1])
+    kind[rows[(named >= 65) & (named <= 90)]] = Kind.OTHER
+    return kind
+
+
+def _host_times(data: Bytes, start: Ints, line: Ints, line_begin: Ints) -> tuple[Floats, Bools]:
+    """The number before the first ``$`` of each sentence's line, and first sentences with anything else there."""
+    if start.size == 0:
+        return np.empty(0), np.empty(0, dtype=np.bool_)
+    first_of_line = np.concatenate(([True], np.diff(line) > 0))
     own = np.flatnonzero(first_of_line)
-    begin = np.where(line_index[own] > 0, np.append(breaks, 0)[line_index[own] - 1] + 1, 0)
-    end = start[own].copy()
+    end, begin = start[own], line_begin[own]
+    near = end - begin <= _LONGEST_PREFIX
+    begin = np.where(near, begin, end)
     for _ in range(4):
-        mark = data[np.maximum(end - 1, 0)]
-        separator = (mark == ord(" ")) | (mark == ord("\t")) | (mark == ord(",")) | (mark == ord(";"))
-        end = np.where(separator & (end > begin), end - 1, end)
-    for _ in range(2):
-        mark = data[begin]
-        begin = np.where(((mark == ord(" ")) | (mark == ord("\r"))) & (begin < end), begin + 1, begin)
-    times: Floats = parse_decimals(data, begin, end)[np.cumsum(first_of_line) - 1]
-    return times
-
-
-def parse_decimals(data: Bytes, begin: Ints, end: Ints) -> Floats:
-    """Plain decimals ``[-+]digits[.digits]`` at [begin, end) of the buffer; NaN for anything else or over 20 bytes."""
-    length = end - begin
-    mantissa = np.zeros(begin.size, dtype=np.int64)
-    digits = np.zeros(begin.size, dtype=np.int64)
-    decimals = np.zeros(begin.size, dtype=np.int64)
-    dotted = np.zeros(begin.size, dtype=np.bool_)
-    wrong = (length <= 0) | (length > _LONGEST_NUMBER)
-    negative = np.zeros(begin.size, dtype=np.bool_)
-    limit = data.size - 1
-    for place in range(int(min(length.max(initial=0), _LONGEST_NUMBER))):
-        byte = data[np.minimum(begin + place, limit)]
-        inside = place < length
-        digit = byte - np.uint8(48)
-        is_digit = inside & (digit < 10)
-        is_dot = inside & (byte == ord(".")) & ~dotted
-        is_sign = inside & ((byte == ord("-")) | (byte == ord("+"))) if place == 0 else np.zeros_like(inside)
-        wrong |= inside & ~(is_digit | is_dot | is_sign)
-        negative |= is_sign & (byte == ord("-"))
-        counted = is_digit & (digits < 18)
-        mantissa = np.where(counted, mantissa * 10 + digit, mantissa)
-        digits += is_digit & ((digits > 0) | (digit > 0))
-        decimals += counted & dotted
-        wrong |= is_digit & ~counted & ~dotted
-        dotted |= is_dot
-    wrong |= (digits == 0) & ~_any_digit(data, begin, end, limit)
-    values = mantissa / 10.0**decimals
-    return np.where(wrong, np.nan, np.where(negative, -values, values))
-
-
-def _any_digit(data: Bytes, begin: Ints, end: Ints, limit: int) -> Bools:
-    """True for numbers like 0, 0.0 and .0; False for a lone sign or dot."""
-    seen = np.zeros(begin.size, dtype=np.bool_)
-    for place in range(3):
-        byte = data[np.minimum(begin + place, limit)]
-        seen |= (begin + place < end) & (byte - np.uint8(48) < 10)
-    return seen
-
-
-def kinds_in(kind: NDArray[np.bytes_], wanted: Sequence[bytes]) -> Bools:
-    """True where ``kind`` is one of ``wanted``."""
-    found: Bools = np.isin(kind, np.array(wanted, dtype="S3"))
-    return found
+        loose = _BETWEEN[data[np.maximum(end - 1, 0)]] & (end > begin)
+        if not loose.any():
+            break
+        end = end - loose
+    for _ in range(3):
+        loose = _BEFORE[data[begin]] & (begin < end)
+        if not loose.any():
+            break
+        begin = begin + loose
+    times = parse_decimals(data, begin, end)
+    odd = np.zeros(start.size, dtype=np.bool_)
+    odd[own] = np.isnan(times) & ((end > begin) | ~near)
+    return times[np.cumsum(first_of_line) - 1], odd

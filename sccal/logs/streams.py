@@ -66,9 +66,10 @@ class WheelStream:
 
 @dataclass(frozen=True)
 class HeadingStream:
-    """The AHRS reading in the file's own convention (see Vehicle.convention), in radians, not unwrapped."""
+    """A heading in its source's own convention, in radians, not unwrapped."""
 
     t_s: Floats
+    """On the logging computer's clock; where utc_s is given, to within the jitter of the receive times, or UTC."""
     yaw_rad: Floats
     yaw_sigma_rad: Floats | None = None
     pitch_rad: Floats | None = None
@@ -77,6 +78,12 @@ class HeadingStream:
     """Left side up positive."""
     gyro_z_radps: Floats | None = None
     extras: Mapping[str, Floats] = field(default_factory=dict)
+    utc_s: Floats | None = None
+    """The receiver's epochs, where it gives heading and fixes: both are put on the logging clock alike."""
+    convention: Convention | None = None
+    """Of yaw_rad; None for the vehicle's (see Vehicle.convention)."""
+    source: str = "ahrs.csv"
+    """Where the readings come from, as the user would name it."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,8 @@ class FixStream:
     cov_en_m2: Floats
     """East-north covariance stated by the log; 0 where not stated."""
     extras: Mapping[str, Floats] = field(default_factory=dict)
+    speed_mps: Floats | None = None
+    """The receiver's own speed over ground (unsigned) at the fixes' epochs; NaN where there is none at that epoch."""
 
     def take(self, rows: Ints) -> FixStream:
         """Only the fixes at the indices ``rows``."""

@@ -1,0 +1,134 @@
+"""Position fixes out of NMEA sentences, one for each epoch, with what other sentences say about that epoch.
+
+GST gives sigmas, never widened by the HDOP; RMC, KSXT and VTG give the speed over ground.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.nmea_positions import altitude, best_kind, extras
+from sccal.logs.nmea_receivers import one_receiver
+from sccal.logs.nmea_times import Dated, epoch_key, epochs_of_untimed
+from sccal.logs.sentences import Kind, Sentences
+from sccal.logs.streams import FixStream, Notice
+from sccal.logs.timeline import order_in_time
+
+_KNOT_MPS = 1852.0 / 3600.0
+
+
+def read_fixes(dated: Dated, source: str, notices: list[Notice]) -> FixStream | None:
+    """The fixes in order of time; None where there is not one. What was met is told."""
+    positions = best_kind(dated, source, notices)
+    if positions is None:
+        return None
+    positions = one_receiver(dated, positions, source, notices)
+    rows = positions.rows
+    utc_s = dated.running_s[rows] + dated.midnight_s[rows]
+    order, order_notices = order_in_time(utc_s, dated.sentences.line[rows], source)
+    notices += order_notices
+    positions, utc_s = positions.take(order), utc_s[order]
+    rows = positions.rows
+    fixes = dated.sentences.take(rows)
+    running_s = dated.running_s[rows]
+    talker = int(fixes.talker[0])
+    sigma_east_m, sigma_north_m, cov_en_m2 = _stated_sigmas(dated, running_s, talker)
+    _tell_missing_host_times(fixes, source, notices)
+    return FixStream(
+        host_t_s=fixes.host_t_s,
+        utc_s=utc_s,
+        utc_has_date=dated.has_date,
+        lat_deg=positions.lat_deg,
+        lon_deg=positions.lon_deg,
+        alt_m=altitude(fixes, positions.kind),
+        quality=positions.quality,
+        sigma_east_m=sigma_east_m,
+        sigma_north_m=sigma_north_m,
+        cov_en_m2=cov_en_m2,
+        extras=extras(fixes, positions.kind),
+        speed_mps=_speeds(dated, running_s),
+    )
+
+
+def _speeds(dated: Dated, running_s: Floats) -> Floats | None:
+    """Speed over ground (m/s) at the epochs ``running_s``, from RMC, else KSXT, else VTG; None where there is none."""
+    wanted = epoch_key(running_s)
+    speed_mps = np.full(wanted.size, np.nan)
+    for kind in (Kind.RMC, Kind.KSXT, Kind.VTG):
+        rows = np.flatnonzero(dated.sentences.kind == kind)
+        missing = np.flatnonzero(np.isnan(speed_mps))
+        if rows.size == 0 or missing.size == 0:
+            continue
+        own = dated.sentences.take(rows)
+        if kind == Kind.RMC:
+            value = np.where(own.letter(2) == ord("A"), own.number(7) * _KNOT_MPS, np.nan)
+        elif kind == Kind.KSXT:
+            value = own.number(8) / 3.6
+        else:
+            knots, kmph = own.number(5), own.number(7)
+            value = np.where(np.isfinite(kmph), kmph / 3.6, knots * _KNOT_MPS)
+            value = np.where(own.letter(9) == ord("N"), np.nan, value)
+        usable = np.flatnonzero(np.isfinite(value) & (value >= 0))
+        if usable.size == 0:
+            continue
+        rows, value = rows[usable], value[usable]
+        key = epoch_key(_epochs_by_talker(dated, rows) if kind == Kind.VTG else dated.running_s[rows])
+        at, hit = _matched(key, wanted[missing])
+        speed_mps[missing[hit]] = value[at[hit]]
+    return speed_mps if np.isfinite(speed_mps).any() else None
+
+
+def _epochs_by_talker(dated: Dated, rows: Ints) -> Floats:
+    talker = dated.sentences.talker[rows]
+    epoch_s = np.full(rows.size, np.nan)
+    for one in np.unique(talker).tolist():
+        own = talker == one
+        epoch_s[own] = epochs_of_untimed(dated, rows[own])
+    return epoch_s
+
+
+def _matched(key: Ints, wanted: Ints) -> tuple[Ints, Bools]:
+    """For each wanted epoch the index of its first key, and whether there is one."""
+    keys, first = (key, np.arange(key.size)) if (np.diff(key) > 0).all() else np.unique(key, return_index=True)
+    at = np.minimum(np.searchsorted(keys, wanted), keys.size - 1)
+    return first[at], keys[at] == wanted
+
+
+def _stated_sigmas(dated: Dated, fix_running_s: Floats, talker: int) -> tuple[Floats, Floats, Floats]:
+    """East and north sigmas and their covariance for each fix, from the GST of the same epoch; own talker first."""
+    n = fix_running_s.size
+    east, north, cov = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
+    rows = np.flatnonzero((dated.sentences.kind == Kind.GST) & np.isfinite(dated.running_s))
+    if rows.size == 0:
+        return east, north, cov
+    other = dated.sentences.talker[rows] != talker
+    if other.any() and not other.all():
+        rows = rows[np.argsort(other, kind="stable")]
+    gst = dated.sentences.take(rows)
+    at, hit = _matched(epoch_key(dated.running_s[rows]), epoch_key(fix_running_s))
+    gst_north, gst_east = gst.number(6), gst.number(7)
+    major, minor, bearing = gst.number(3), gst.number(4), np.radians(gst.number(5))
+    var_north = (major * np.cos(bearing)) ** 2 + (minor * np.sin(bearing)) ** 2
+    var_east = (major * np.sin(bearing)) ** 2 + (minor * np.cos(bearing)) ** 2
+    ellipse_cov = (major**2 - minor**2) * np.sin(bearing) * np.cos(bearing)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        stated = (gst_north > 0) & (gst_east > 0)
+        agrees = stated & _near(np.sqrt(var_north), gst_north) & _near(np.sqrt(var_east), gst_east)
+        gst_cov = ellipse_cov / np.sqrt(var_north * var_east) * gst_north * gst_east
+    gst_cov = np.where(agrees & np.isfinite(gst_cov), gst_cov, 0.0)
+    hit &= stated[at]
+    east[hit], north[hit], cov[hit] = gst_east[at[hit]], gst_north[at[hit]], gst_cov[at[hit]]
+    return east, north, cov
+
+
+def _near(a: Floats, b: Floats) -> Bools:
+    near: Bools = np.abs(a - b) <= 0.2 * np.maximum(a, b)
+    return near
+
+
+def _tell_missing_host_times(fixes: Sentences, source: str, notices: list[Notice]) -> None:
+    missing = ~np.isfinite(fixes.host_t_s)
+    if missing.any() and not missing.all():
+        where = f"line {fixes.line[missing][0]}"
+        notices.append(Notice(source, "fixes without a receive time among others with one", int(missing.sum()), where))

@@ -1,0 +1,282 @@
+"""Headings out of NMEA sentences, for logs whose heading comes from two antennas or from a receiver with gyros.
+
+All are clockwise from true north ("ned"). Sources of fields and signs:
+
+* HDT: NMEA 0183; heading, T.
+* THS: IEC 61162-1; heading, mode: A autonomous (and D, P, R, F as in RMC, or nothing); E estimated, M manual,
+  S simulator and V void are not measurements.
+* PASHR: Applanix POS MV V5 guide, table 20; NovAtel OEM7 and Trimble receiver help: time, heading, T, roll, pitch,
+  heave, sigmas of roll, pitch and heading, quality (0 is none everywhere, the other numbers differ), status of the
+  gyros. Roll is positive to starboard, the left side up, and pitch bow up (OxTS NMEA description; QPS driver manual,
+  "Applanix PASHR": roll positive heeling to starboard, pitch positive bow up): the signs of ahrs.csv.
+* PTNL,AVR: Trimble receiver help: time, yaw, "Yaw", tilt, "Tilt", roll, "Roll", length of the baseline, quality
+  (3 RTK fixed, 2 RTK float). Tilt is the baseline's inclination; the receiver writes Roll instead where it is told that
+  the antennas stand side by side.
+* KSXT: Unicore N4 commands reference; ComNav: heading in field 5, pitch in 6, roll in 9 where there are gyros, quality
+  of the heading in 11 (3 fixed, 2 float).
+
+The inclination of a baseline is pitch where the second antenna stands in front of the first. A baseline across the
+robot adds 90° to the heading: the heading offset absorbs that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.nmea_positions import KIND_NAMES
+from sccal.logs.nmea_times import UNTIMED, Dated, epoch_key, epochs_of_untimed
+from sccal.logs.sentences import Kind, Sentences, talker_name
+from sccal.logs.streams import HeadingStream, Notice
+from sccal.logs.timeline import order_in_time
+
+HEADING_KINDS = (Kind.PASHR, Kind.AVR, Kind.KSXT, Kind.THS, Kind.HDT)
+"""The ones that say more about their quality first."""
+HEADING_NAMES = ", ".join(KIND_NAMES[kind] for kind in reversed(HEADING_KINDS))
+
+_FIXED = 3
+_LEAST_SHARE = 0.1
+_LEAST_OF_RICHEST = 0.5
+_BASELINE_SHARE = 0.1
+_OFTENER = 1.5
+_THS_MEASURES = np.frombuffer(b"ADPRF\0", dtype=np.uint8)
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """Usable headings of one kind; arrays of length m."""
+
+    kind: Kind
+    rows: Ints
+    yaw_deg: Floats
+    pitch_deg: Floats | None = None
+    roll_deg: Floats | None = None
+    sigma_deg: Floats | None = None
+
+    def take(self, keep: Bools | Ints) -> _Readings:
+        pitch, roll, sigma = (
+            None if column is None else column[keep] for column in (self.pitch_deg, self.roll_deg, self.sigma_deg)
+        )
+        return _Readings(self.kind, self.rows[keep], self.yaw_deg[keep], pitch, roll, sigma)
+
+
+def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStream | None:
+    """The best kind's headings in order of time; None where there is not one. What was met is told."""
+    readings = _best_kind(dated, source, notices)
+    if readings is None:
+        return None
+    name = f"{source} ({KIND_NAMES[readings.kind]})"
+    readings = _one_talker(dated, readings, name, notices)
+    epoch_s, host_s = _epochs(dated, readings, name, notices)
+    t_s = host_s if epoch_s is None else epoch_s
+    timed = np.flatnonzero(np.isfinite(t_s))
+    if timed.size < t_s.size:
+        first = dated.sentences.line[readings.rows[~np.isfinite(t_s)][0]]
+        what = "headings without an epoch of their own dropped"
+        notices.append(Notice(name, what, int(t_s.size - timed.size), f"line {first}"))
+    if timed.size == 0:
+        return None
+    order, order_notices = order_in_time(t_s[timed], dated.sentences.line[readings.rows[timed]], name)
+    notices += order_notices
+    chosen = timed[order]
+    readings = readings.take(chosen)
+    what = "headings read, clockwise from true north"
+    if readings.kind in (Kind.AVR, Kind.KSXT) and readings.pitch_deg is not None:
+        what += "; their pitch is the inclination of the baseline between the antennas"
+    notices.append(Notice(name, what, int(chosen.size)))
+    return HeadingStream(
+        t_s=host_s[chosen],
+        yaw_rad=np.radians(readings.yaw_deg),
+        yaw_sigma_rad=_stated(readings.sigma_deg),
+        pitch_rad=_filled(readings.pitch_deg, t_s[chosen]),
+        roll_rad=_filled(readings.roll_deg, t_s[chosen]),
+        utc_s=None if epoch_s is None else epoch_s[chosen],
+        convention="ned",
+        source=name,
+    )
+
+
+def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Readings | None:
+    """The first kind that has at least half as many usable readings as the richest."""
+    found: list[tuple[_Readings, list[Notice]]] = []
+    for kind in HEADING_KINDS:
+        usable = dated.sentences.kind == kind
+        if kind not in UNTIMED:
+            usable &= np.isfinite(dated.running_s)
+        rows = np.flatnonzero(usable)
+        if rows.size:
+            own: list[Notice] = []
+            name = f"{source} ({KIND_NAMES[kind]})"
+            found.append((_READERS[kind](dated.sentences.take(rows), rows, name, own), own))
+    richest = max((readings.rows.size for readings, _ in found), default=0)
+    if richest == 0:
+        for _, own in found:
+            notices += own
+        return None
+    chosen, own = next(one for one in found if one[0].rows.size >= _LEAST_OF_RICHEST * richest)
+    notices += own
+    for readings, _ in found:
+        if readings is not chosen and readings.rows.size:
+            what = f"headings not used because {KIND_NAMES[chosen.kind]} gives them too"
+            notices.append(Notice(f"{source} ({KIND_NAMES[readings.kind]})", what, readings.rows.size))
+    return chosen
+
+
+def _hdt(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
+    begin, end = own.span(2)
+    reference = own.letter(2)
+    readings = _Readings(Kind.HDT, rows, own.number(1))
+    return _plausible(own, readings, (reference == ord("T")) | (begin == end), own.span(1), name, notices)
+
+
+def _ths(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
+    readings = _Readings(Kind.THS, rows, own.number(1))
+    return _plausible(own, readings, np.isin(own.letter(2), _THS_MEASURES), own.span(1), name, notices)
+
+
+def _pashr(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
+    readings = _Readings(Kind.PASHR, rows, own.number(2), own.number(5), own.number(4), own.number(9))
+    measured = (own.letter(3) == ord("T")) & (own.number(10) != 0)
+    return _plausible(own, readings, measured, own.span(2), name, notices)
+
+
+def _avr(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
+    tilt = np.where(own.letters(5, 1)[:, 0] == ord("T"), own.number(4), np.nan)
+    roll = np.where(own.letters(7, 1)[:, 0] == ord("R"), own.number(6), np.nan)
+    labelled = own.letters(3, 1)[:, 0] == ord("Y")
+    readings = _Readings(Kind.AVR, rows, own.number(2), _or_none(tilt), _or_none(roll))
+    length_m = own.number(8)
+    measured = labelled & _best_quality(own.number(9), name, own, notices)
+    if measured.any() and np.isfinite(length_m[measured]).any():
+        usual_m = float(np.nanmedian(length_m[measured]))
+        odd = measured & (np.abs(length_m - usual_m) > _BASELINE_SHARE * usual_m)
+        if odd.any():
+            what = f"headings dropped whose baseline is not the usual {usual_m:.2f} m long"
+            notices.append(Notice(name, what, int(odd.sum()), f"line {own.line[odd][0]}"))
+            own, rows, measured = own.take(np.flatnonzero(~odd)), rows[~odd], measured[~odd]
+            readings = readings.take(~odd)
+    return _plausible(own, readings, measured, own.span(2), name, notices)
+
+
+def _ksxt(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
+    roll = _or_none(own.number(9))
+    readings = _Readings(Kind.KSXT, rows, own.number(5), _or_none(own.number(6)), roll)
+    measured = _best_quality(own.number(11), name, own, notices)
+    return _plausible(own, readings, measured, own.span(5), name, notices)
+
+
+_READERS: dict[Kind, Callable[[Sentences, Ints, str, list[Notice]], _Readings]] = {
+    Kind.HDT: _hdt,
+    Kind.THS: _ths,
+    Kind.PASHR: _pashr,
+    Kind.AVR: _avr,
+    Kind.KSXT: _ksxt,
+}
+
+
+def _best_quality(quality: Floats, name: str, own: Sentences, notices: list[Notice]) -> Bools:
+    """The fixed headings, where at least a tenth are; else all that there are, told."""
+    some: Bools = quality > 0
+    fixed: Bools = quality == _FIXED
+    rest = some & ~fixed
+    if fixed.sum() >= _LEAST_SHARE * some.sum():
+        if rest.any():
+            what = "headings without fixed ambiguities dropped"
+            notices.append(Notice(name, what, int(rest.sum()), f"line {own.line[rest][0]}"))
+        return fixed
+    what = "headings without fixed ambiguities read because there are hardly others"
+    doubt = f"{name}: nearly all headings come without fixed ambiguities and may be degrees off"
+    notices.append(Notice(name, what, int(rest.sum()), f"line {own.line[rest][0]}", "warning", doubt))
+    return some
+
+
+def _plausible(
+    own: Sentences, readings: _Readings, measured: Bools, span: tuple[Ints, Ints], name: str, notices: list[Notice]
+) -> _Readings:
+    """The readings that are headings and measured; the others are told."""
+    empty = span[0] == span[1]
+    possible = np.abs(readings.yaw_deg) <= 360.0
+    for lost, what in (
+        (empty | ~measured & possible, "sentences without a heading passed over"),
+        (~empty & ~possible, "sentences with an impossible heading dropped"),
+    ):
+        if lost.any():
+            notices.append(Notice(name, what, int(lost.sum()), f"line {own.line[lost][0]}"))
+    keep = measured & possible & ~empty
+    return readings if keep.all() else readings.take(keep)
+
+
+def _or_none(column: Floats) -> Floats | None:
+    return column if np.isfinite(column).any() else None
+
+
+def _one_talker(dated: Dated, readings: _Readings, name: str, notices: list[Notice]) -> _Readings:
+    """The headings of the talker that says most, and of others that speak in its pauses only."""
+    talker = dated.sentences.talker[readings.rows]
+    if (talker == talker[0]).all():
+        return readings
+    talkers, counts = np.unique(talker, return_counts=True)
+    first = int(talkers[np.argmax(counts)])
+    epoch_s = dated.running_s[readings.rows]
+    for one in talkers.tolist():
+        own = np.flatnonzero(talker == one)
+        if np.isnan(epoch_s[own]).all():
+            epoch_s[own] = epochs_of_untimed(dated, readings.rows[own])
+    key = epoch_key(epoch_s)
+    keep = talker == first
+    for one in talkers[talkers != first].tolist():
+        own = talker == one
+        names = talker_name(one), talker_name(first)
+        where = f"line {dated.sentences.line[readings.rows[own][0]]}"
+        if np.isin(key[own], key[talker == first]).mean() < _LEAST_SHARE:
+            keep |= own
+            what = f"headings of talker {names[0]} in the pauses of {names[1]} read as one receiver's"
+            notices.append(Notice(name, what, int(own.sum()), where))
+        else:
+            what = f"headings of talker {names[0]} dropped beside those of {names[1]}, which are more"
+            notices.append(Notice(name, what, int(own.sum()), where, "warning"))
+    return readings.take(keep)
+
+
+def _epochs(dated: Dated, readings: _Readings, name: str, notices: list[Notice]) -> tuple[Floats | None, Floats]:
+    """UTC of the readings' epochs (m,), None where they come by a clock of their own, and their receive times (m,).
+
+    The receive times follow the epochs' own spacing, so that they increase; where the log has none they are UTC.
+    Untimed headings that come much oftener than epochs are another instrument's: they are true when they arrive.
+    """
+    sentences, rows = dated.sentences, readings.rows
+    host_s = sentences.host_t_s[rows]
+    epoch_s = dated.running_s[rows]
+    if readings.kind in UNTIMED:
+        epochs = np.unique(epoch_key(dated.running_s[np.isfinite(dated.running_s)])).size
+        if rows.size > _OFTENER * epochs and np.isfinite(host_s).all():
+            what = "headings come oftener than fixes: taken as true when they were received"
+            notices.append(Notice(name, what, rows.size, f"line {sentences.line[rows[0]]}"))
+            return None, host_s
+        epoch_s = np.full(rows.size, np.nan)
+        for one in np.unique(sentences.talker[rows]).tolist():
+            own = sentences.talker[rows] == one
+            epoch_s[own] = epochs_of_untimed(dated, rows[own])
+    utc_s = epoch_s + dated.midnight_s[rows]
+    late_s = host_s - utc_s
+    known = np.isfinite(late_s)
+    return utc_s, utc_s + float(np.median(late_s[known])) if known.any() else utc_s
+
+
+def _stated(sigma_deg: Floats | None) -> Floats | None:
+    if sigma_deg is None or not (sigma_deg > 0).any():
+        return None
+    return np.radians(np.where(sigma_deg > 0, sigma_deg, np.nan))
+
+
+def _filled(angle_deg: Floats | None, t_s: Floats) -> Floats | None:
+    """In radians, gaps filled in between their neighbours; None where half of it or more is missing."""
+    if angle_deg is None:
+        return None
+    known = np.isfinite(angle_deg)
+    if known.mean() <= 0.5:
+        return None
+    return np.radians(angle_deg if known.all() else np.interp(t_s, t_s[known], angle_deg[known]))
