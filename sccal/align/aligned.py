@@ -15,6 +15,8 @@ from sccal.align.accuracy import (
     usable,
 )
 from sccal.align.agreement import check_agreement
+from sccal.align.clock_fit import Fixes, wheel_path
+from sccal.align.clock_motion import clock_by_motion
 from sccal.align.clocks import Clock, fixes_on_host_clock, require_overlap
 from sccal.align.path import laid_out
 from sccal.align.signs import check_signs
@@ -24,6 +26,8 @@ from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 
 MIN_MEASUREMENTS = 10
+WHEEL_RATE_HZ = 20.0
+"""As fine as the path need be for comparing clocks."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,7 @@ def align(run: Run) -> Aligned:
     t_s, timed, clock = fixes_on_host_clock(fixes, span)
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
+    t_s, clock = _clocks_by_motion(run, wheels, t_s, timed, clock, notices)
     require_overlap(t_s[timed], span, clock, "the fixes")
 
     good = timed & usable(fixes.quality)
@@ -178,6 +183,38 @@ def align(run: Run) -> Aligned:
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
+
+
+def _clocks_by_motion(
+    run: Run, wheels: WheelStream, t_s: Floats, timed: Bools, clock: Clock, notices: list[Notice]
+) -> tuple[Floats, Clock]:
+    """The fixes' times moved onto the wheels' clock where the motion shows that they are clearly off it."""
+    fixes, vehicle = run.fixes, run.vehicle
+    rows = np.flatnonzero(timed & usable(fixes.quality))
+    rows = rows[np.argsort(t_s[rows], kind="stable")]
+    if rows.size < MIN_MEASUREMENTS:
+        return t_s, clock
+    var_east, var_north, _ = fix_covariance(
+        fixes.quality[rows], fixes.sigma_east_m[rows], fixes.sigma_north_m[rows], fixes.cov_en_m2[rows]
+    )
+    leading = _leading(fixes.quality[rows], var_east + var_north)
+    rows, sigma = rows[leading], float(np.sqrt(np.median((var_east + var_north)[leading]) / 2.0))
+    plane = TangentPlane(float(fixes.lat_deg[rows[0]]), float(fixes.lon_deg[rows[0]]), 0.0)
+    east, north = plane.to_east_north(fixes.lat_deg[rows], fixes.lon_deg[rows])
+    every = max(1, round(WHEEL_RATE_HZ ** -1 / max(float(np.median(np.diff(wheels.t_s))), 1e-6)))
+    covered = (wheels.t_s >= run.heading.t_s[0]) & (wheels.t_s <= run.heading.t_s[-1])
+    index = np.flatnonzero(covered)[::every]
+    if index.size < MIN_MEASUREMENTS:
+        return t_s, clock
+    yaw = np.unwrap(yaw_to_enu(run.heading.yaw_rad, vehicle.convention))
+    travel = vehicle.wheel_radius_m * 0.5 * (wheels.right_rad[index] + wheels.left_rad[index])
+    path = wheel_path(wheels.t_s[index], travel, np.interp(wheels.t_s[index], run.heading.t_s, yaw), vehicle.track_m)
+    span = (float(run.wheels.t_s[0]), float(run.wheels.t_s[-1]))
+    found = clock_by_motion(path, Fixes(t_s[rows], east + 1j * north, sigma), span)
+    if found is None:
+        return t_s, clock
+    notices += found.notices
+    return found.moved(t_s), found.after(clock)
 
 
 def _further_columns(*streams: tuple[str, Floats, Mapping[str, Floats]]) -> dict[str, Series]:

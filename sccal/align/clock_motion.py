@@ -1,0 +1,181 @@
+"""Do the fixes' clock and the wheels' clock agree? If they clearly do not, by how much, from the motion alone.
+
+Lags at which both streams move together come from `clock_search`, their offset and skew from `clock_fit`. A drive may
+repeat itself (laps, rows, a circle at one speed), so several offsets may fit equally well: then clocks that agree as
+logged are left alone; else the only offset at which both streams begin and end together is taken; else nothing is guessed.
+A mismatch that a late receiver could make is left too: a latency and a skew of that size are effects, and diagnosed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sccal.align.clock_fit import ClockFit, Fixes, WheelPath, fit_clock
+from sccal.align.clock_search import Lag, find_lags
+from sccal.align.clocks import Clock
+from sccal.arrays import Floats
+from sccal.errors import DataError
+from sccal.logs.streams import Notice
+
+LATENCY_S = 0.3
+"""Receivers and radio links are late by as much; what is more is a matter of clocks."""
+CLEAR_SIGMAS = 5.0
+CLEARLY_WORSE = 4.0
+"""Standard errors of the mean logarithm of the blocks' costs."""
+CLEAR_GAIN = 25.0
+SAME_S = 1.0
+TOGETHER_S = 10.0
+MOST_FITTED = 8
+FEWEST_BLOCKS = 3
+KNOWN_S = 0.3
+"""An offset less certain than this is a doubt."""
+
+
+@dataclass(frozen=True)
+class MotionClock:
+    """What to add to the fixes' times: offset + skew · (t − reference)."""
+
+    fit: ClockFit
+    reference_s: float
+    notices: tuple[Notice, ...]
+
+    def moved(self, t_s: Floats) -> Floats:
+        """Times of fixes (n,) on the wheels' clock."""
+        return np.asarray(t_s + (self.fit.offset_s + self.fit.skew * (t_s - self.reference_s)))
+
+    def after(self, clock: Clock) -> Clock:
+        """Both steps as one clock: how the fixes had their times, and then this."""
+        return replace(
+            clock,
+            source="motion",
+            offset_s=clock.offset_s + self.fit.offset_s,
+            skew_ppm=clock.skew_ppm + 1e6 * self.fit.skew,
+            sigma_offset_s=float(np.hypot(clock.sigma_offset_s, self.fit.sigma_offset_s)),
+            sigma_skew_ppm=float(np.hypot(clock.sigma_skew_ppm, 1e6 * self.fit.sigma_skew)),
+        )
+
+
+def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]) -> MotionClock | None:
+    """How far the fixes' clock is off the wheels', or None where the clocks agree or the motion does not tell.
+
+    span_s is what the wheels' stream covers. Raises DataError where the clocks as logged do not overlap and several
+    offsets fit equally well.
+    """
+    if fixes.t_s.size < 2 or wheels.t_s.size < 2:
+        return None
+    overlap = fixes.t_s[-1] >= span_s[0] and fixes.t_s[0] <= span_s[1]
+    lags = find_lags(wheels, fixes)
+    if not lags:
+        mirrored = wheels.mirrored()
+        lags = find_lags(mirrored, fixes)
+        if not lags:
+            return None
+        wheels = mirrored
+    local = fit_clock(wheels, fixes, 0.0) if overlap else None
+    if local is not None and _near(lags[0], 0.0, fixes) and _keeps(local, fixes):
+        return None
+    fits = _fitted(wheels, fixes, lags, local)
+    if not fits:
+        return None
+    good = _good(fits)
+    if local is not None and _keeps(local, fixes) and any(abs(f.offset_s) < SAME_S for f in good):
+        return None
+    chosen = good[0]
+    notices: list[Notice] = []
+    if len(good) > 1:
+        together = _begins_and_ends_together(good, fixes, span_s)
+        others = ", ".join(f"{f.offset_s:+.2f} s" for f in good[:5])
+        if together is not None:
+            chosen = together
+            what = f"offsets between the clocks fit the motion equally well ({others}); taken the one at which both streams begin and end together"
+            notices.append(Notice("gnss", what, len(good)))
+        elif not overlap:
+            raise DataError(
+                f"the fixes and encoder.csv share no time as logged, and the drive repeats itself: {len(good)} offsets between "
+                f"their clocks fit equally well ({others}): log the receive time before each NMEA line, or stand still once"
+            )
+        else:
+            chosen = max(good, key=lambda f: (round(f.covered, 2), -abs(f.offset_s)))
+            doubt = f"the clock of the fixes is off, and the drive repeats itself: {others} fit equally well"
+            what = f"offsets between the clocks fit the motion equally well ({others}): log receive times"
+            notices.append(Notice("gnss", what, len(good), "", "warning", doubt))
+    half_s = 0.5 * float(np.ptp(fixes.t_s))
+    if not overlap or _mismatch_is_clear(chosen, half_s):
+        notices.insert(0, _told(chosen, fixes))
+        return MotionClock(chosen, fixes.middle_s, tuple(notices))
+    return None
+
+
+def _near(lag: Lag, offset_s: float, fixes: Fixes) -> bool:
+    return abs(lag.offset_s - offset_s) <= SAME_S + abs(lag.skew) * 0.5 * float(np.ptp(fixes.t_s))
+
+
+def _keeps(local: ClockFit, fixes: Fixes) -> bool:
+    """Whether the clocks as logged are as good as agreed."""
+    return not _mismatch_is_clear(local, 0.5 * float(np.ptp(fixes.t_s)))
+
+
+def _mismatch_is_clear(fit: ClockFit, half_s: float) -> bool:
+    """Whether the clocks disagree, at one end of the run or the other, by more than a latency and than chance."""
+    return any(
+        abs(off_s) > max(LATENCY_S, CLEAR_SIGMAS * sigma_s) for off_s, sigma_s in (fit.at(-half_s), fit.at(half_s))
+    )
+
+
+def _fitted(wheels: WheelPath, fixes: Fixes, lags: list[Lag], local: ClockFit | None) -> list[ClockFit]:
+    """The lags refined, all under the noise of the best of them; distinct ones, most explained first."""
+    first = fit_clock(wheels, fixes, lags[0].offset_s, lags[0].skew)
+    if first is None:
+        return []
+    starts = [(lag.offset_s, lag.skew) for lag in lags[1:MOST_FITTED]]
+    if local is not None:
+        starts.append((0.0, 0.0))
+    fits = [first]
+    for offset_s, skew in starts:
+        fit = fit_clock(wheels, fixes, offset_s, skew, first.filters)
+        if fit is not None and all(abs(fit.offset_s - other.offset_s) > SAME_S for other in fits):
+            fits.append(fit)
+    return [fit for fit in fits if fit.cost.size >= FEWEST_BLOCKS]
+
+
+def _good(fits: list[ClockFit]) -> list[ClockFit]:
+    """Those whose innovations are not clearly larger than the smallest."""
+    logs = [np.log(fit.cost + 1e-12) for fit in fits]
+    best = min(logs, key=lambda values: float(values.mean()))
+
+    def clearly_worse(values: np.ndarray) -> bool:
+        error = np.sqrt(values.var() / values.size + best.var() / best.size)
+        return float(values.mean() - best.mean()) > CLEARLY_WORSE * max(float(error), 1e-9)
+
+    return [fit for fit, values in zip(fits, logs, strict=True) if not clearly_worse(values)]
+
+
+def _begins_and_ends_together(good: list[ClockFit], fixes: Fixes, span_s: tuple[float, float]) -> ClockFit | None:
+    """The one fit under which both streams begin and end within TOGETHER_S of each other, if no other comes near."""
+    half = 0.5 * float(np.ptp(fixes.t_s))
+
+    def apart(fit: ClockFit) -> float:
+        first = fixes.t_s[0] + fit.at(-half)[0] - span_s[0]
+        last = fixes.t_s[-1] + fit.at(half)[0] - span_s[1]
+        return float(max(abs(first), abs(last)))
+
+    order = sorted(good, key=apart)
+    nearest, next_ = apart(order[0]), apart(order[1])
+    return order[0] if nearest < TOGETHER_S and next_ > 3.0 * nearest + TOGETHER_S else None
+
+
+def _told(fit: ClockFit, fixes: Fixes) -> Notice:
+    """What was found; a doubt where it is not known well."""
+    what = (
+        f"fixes put on the wheels' clock by their motion: offset {fit.offset_s:+.3f} ± {fit.sigma_offset_s:.3f} s, "
+        f"skew {1e6 * fit.skew:+.0f} ± {1e6 * fit.sigma_skew:.0f} ppm; a latency of the receiver is part of the offset"
+    )
+    doubt = ""
+    if fit.sigma_offset_s > KNOWN_S:
+        doubt = (
+            f"the offset between the clocks is known to ± {fit.sigma_offset_s:.2f} s only: "
+            "log receive times, or stop now and then"
+        )
+    return Notice("gnss", what, int(fixes.t_s.size), "", "warning", doubt)
