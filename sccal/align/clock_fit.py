@@ -22,9 +22,10 @@ from sccal.align.path import laid_out
 from sccal.arrays import Bools, Complexes, Floats, Ints
 
 CELL_S = 1.0
-"""Fixes, and the path at their times, are averaged over this long: nothing that slow robots do is lost."""
+MOST_CELLS = 2400
+"""Fixes, and the path at their times, are averaged over a second, over more in a log of hours: little is lost."""
 MEMORIES_S = (0.5, 1.5, 5.0, 15.0, 50.0)
-AUTOREGRESSION = 4
+AUTOREGRESSION = 12
 ROUNDS = 12
 CONVERGED_S = 2e-4
 NEIGHBOURS = 9
@@ -36,9 +37,18 @@ MOST_BLOCKS = 40
 SLOPE_S = 0.1
 FARTHEST_STEP_S = 2.0
 LARGEST_SKEW = 1.5e-3
-PRIOR_SKEW = 3e-4
-PRIOR_DRIFT_RADPS = np.radians(10.0) / 3600.0
+PRIOR_SKEW = 4e-4
+PRIOR_DRIFT_RADPS = np.radians(3.0) / 3600.0
 PRIOR_SCALE = 0.2
+
+
+@dataclass(frozen=True)
+class Filters:
+    """What makes the innovations of both channels white: for each λ, and an autoregression."""
+
+    in_body: bool
+    """Channels are forward and left (slip and heading errors rule), else east and north (the fixes' noise rules)."""
+    channels: tuple[tuple[float, Floats], tuple[float, Floats]]
 
 
 @dataclass(frozen=True)
@@ -96,8 +106,8 @@ class ClockFit:
     """|α|: metres by the fixes per metre by the wheels."""
     covered: float
     """Share of the fixes' time in which the wheels' path is known."""
-    filters: tuple[float, Floats]
-    """λ and the autoregression: what makes two fits comparable."""
+    filters: Filters
+    """Of the two channels: what makes two fits comparable."""
 
     @property
     def sigma_offset_s(self) -> float:
@@ -118,7 +128,7 @@ def fit_clock(
     fixes: Fixes,
     offset_s: float,
     skew: float = 0.0,
-    filters: tuple[float, Floats] | None = None,
+    filters: Filters | None = None,
     rounds: int = ROUNDS,
 ) -> ClockFit | None:
     """Least squares from a first guess that is right to about a second; None where too little of the path is shared.
@@ -148,6 +158,7 @@ def fit_clock(
                     1j * alpha * bent,
                     alpha * slope,
                     alpha * slope * since_s,
+                    alpha * turn,
                 ]
             ),
             z - model,
@@ -155,12 +166,11 @@ def fit_clock(
         if whole is None:
             return None
         rows, at_s = whole
-        gap = np.diff(at_s) > 1.5 * max(CELL_S, float(np.median(np.diff(at_s))))
         if filters is None and round_ >= min(2, rounds):
-            filters = _choose_filters(rows, gap, at_s, wheels.arm_m)
-        use = filters if filters is not None else (_memory(15.0, at_s), np.zeros(0))
-        white, keep = _whitened(rows, gap, use)
-        solution = _solve(white[keep], at_s[1:][keep], wheels.arm_m, (arm, drift, skew))
+            filters = _choose_filters(rows, at_s, wheels.arm_m)
+        use = filters if filters is not None else Filters(False, ((_memory(15.0, at_s), np.zeros(0)),) * 2)
+        white = _whitened(_steps(rows, at_s, use.in_body), use)
+        solution = _solve(white, at_s[1:], wheels.arm_m, (arm, drift, skew))
         if rounds == 0 or round_ == rounds:
             break
         step, step_skew = float(solution.values[5]), float(solution.values[6])
@@ -176,9 +186,9 @@ def fit_clock(
     return ClockFit(
         offset_s,
         skew,
-        solution.covariance[5:, 5:],
+        solution.covariance[5:7, 5:7],
         solution.cost,
-        int(keep.sum()),
+        at_s.size,
         float(abs(alpha)),
         covered,
         filters if filters is not None else use,
@@ -217,7 +227,8 @@ def _cells(t_s: Floats, rows: Complexes, left: Complexes) -> tuple[Complexes, Fl
     """Means over CELL_S of the rows (n, k) whose residual does not stand out from its neighbours', and cell times."""
     keep = _no_outliers(left)
     t_s, rows = t_s[keep], rows[keep]
-    number = np.floor((t_s - t_s[0]) / CELL_S).astype(np.int64)
+    cell_s = max(CELL_S, float(t_s[-1] - t_s[0]) / MOST_CELLS)
+    number = np.floor((t_s - t_s[0]) / cell_s).astype(np.int64)
     start = np.flatnonzero(np.concatenate(([True], np.diff(number) > 0)))
     if start.size < FEWEST_CELLS:
         return None
@@ -238,43 +249,59 @@ def _memory(memory_s: float, at_s: Floats) -> float:
     return float(np.exp(-float(np.median(np.diff(at_s))) / memory_s))
 
 
-def _whitened(rows: Complexes, gap: Bools, filters: tuple[float, Floats]) -> tuple[Complexes, Bools]:
-    """Innovations (n − 1, k) of the columns, and which rows do not step over a gap."""
-    lam, ar = filters
-    steps = np.diff(rows, axis=0)
+def _steps(rows: Complexes, at_s: Floats, in_body: bool) -> tuple[Floats, Floats]:
+    """Changes of the columns from cell to cell in both channels; the last column heads forward and is left out."""
+    steps = np.diff(rows[:, :-1], axis=0)
+    if in_body:
+        ahead = rows[1:, -1] + rows[:-1, -1]
+        steps *= np.conj(ahead / np.maximum(np.abs(ahead), 1e-12))[:, None]
+    gap = np.diff(at_s) > 1.5 * float(np.median(np.diff(at_s)))
     steps[gap] = 0.0
-    white = lfilter([1.0], [1.0, -lam], steps, axis=0)
-    if ar.size:
-        white = lfilter(np.concatenate(([1.0], -ar)), [1.0], white, axis=0)
-    return white, ~gap
+    return steps.real, steps.imag
 
 
-def _choose_filters(rows: Complexes, gap: Bools, at_s: Floats, arm_m: float) -> tuple[float, Floats]:
-    """λ by likelihood, then an autoregression of what correlation is left."""
-    best: tuple[float, float, Complexes] | None = None
-    for memory_s in MEMORIES_S:
-        lam = _memory(memory_s, at_s)
-        white, keep = _whitened(rows, gap, (lam, np.zeros(0)))
-        solution = _solve(white[keep], at_s[1:][keep], arm_m, (0j, 0.0, 0.0))
-        if best is None or solution.score < best[0]:
-            best = (solution.score, lam, solution.residual)
-    assert best is not None
-    spread = float(np.median(np.abs(best[2])))
-    clipped = best[2] / np.maximum(np.abs(best[2]) / max(3.0 * spread, 1e-9), 1.0)
-    return best[1], _yule_walker(clipped)
+def _filtered(steps: Floats, lam: float, ar: Floats) -> Floats:
+    """Innovations of the columns (n, k) of one channel, and (n,) of what stood before its first step."""
+    before = np.zeros((steps.shape[0], 1))
+    before[0] = -lam
+    white = lfilter([1.0], [1.0, -lam], np.hstack((steps, before)), axis=0)
+    return np.asarray(lfilter(np.concatenate(([1.0], -ar)), [1.0], white, axis=0) if ar.size else white)
 
 
-def _yule_walker(e: Complexes) -> Floats:
-    """Real autoregression (AUTOREGRESSION,) of both parts of e."""
-    n = e.size
-    if n < 10 * AUTOREGRESSION:
+def _whitened(steps: tuple[Floats, Floats], filters: Filters) -> tuple[Floats, Floats]:
+    (a, b), (for_a, for_b) = steps, filters.channels
+    return _filtered(a, *for_a), _filtered(b, *for_b)
+
+
+def _choose_filters(rows: Complexes, at_s: Floats, arm_m: float) -> Filters:
+    """By likelihood: the channels, λ for each of them, and then an autoregression of what correlation is left."""
+    nothing = np.zeros(0)
+    tried: list[tuple[float, Filters]] = []
+    for in_body in (False, True):
+        steps = _steps(rows, at_s, in_body)
+        best = []
+        for channel in steps:
+            fits = []
+            for memory_s in MEMORIES_S:
+                lam = _memory(memory_s, at_s)
+                solution = _solve((_filtered(channel, lam, nothing),), at_s[1:], arm_m, (0j, 0.0, 0.0))
+                fits.append((solution.score, lam, solution.residual))
+            best.append(min(fits, key=lambda fit: fit[0]))
+        (score_a, lam_a, left_a), (score_b, lam_b, left_b) = best
+        tried.append((score_a + score_b, Filters(in_body, ((lam_a, _yule_walker(left_a)), (lam_b, _yule_walker(left_b))))))
+    return min(tried, key=lambda each: each[0])[1]
+
+
+def _yule_walker(e: Floats) -> Floats:
+    """Autoregression of e (n,), of an order that its length can bear."""
+    order = min(AUTOREGRESSION, e.size // 25)
+    limit = 3.0 * float(np.median(np.abs(e))) / 0.6745 + 1e-9
+    e = np.clip(e, -limit, limit)
+    r = np.array([float(e[: e.size - k] @ e[k:]) for k in range(order + 1)])
+    if order == 0 or r[0] <= 0:
         return np.zeros(0)
-    r = np.array([float((np.conj(e[: n - k]) * e[k:]).real.sum()) for k in range(AUTOREGRESSION + 1)])
-    if r[0] <= 0:
-        return np.zeros(0)
-    lags = np.abs(np.subtract.outer(np.arange(AUTOREGRESSION), np.arange(AUTOREGRESSION)))
-    matrix = r[:-1][lags] + 1e-3 * r[0] * np.eye(AUTOREGRESSION)
-    return np.asarray(np.linalg.solve(matrix, r[1:]))
+    lags = np.abs(np.subtract.outer(np.arange(order), np.arange(order)))
+    return np.asarray(np.linalg.solve(r[:-1][lags] + 1e-3 * r[0] * np.eye(order), r[1:]))
 
 
 @dataclass(frozen=True)
@@ -283,43 +310,42 @@ class _Solution:
     covariance: Floats
     cost: Floats
     score: float
-    residual: Complexes
+    residual: Floats
 
 
-def _solve(white: Complexes, at_s: Floats, arm_m: float, now: tuple[complex, float, float]) -> _Solution:
-    """Robust least squares of the first column on the others, with priors; block-robust covariance."""
-    y = np.concatenate((white[:, 0].real, white[:, 0].imag))
-    x = np.concatenate((white[:, 1:].real, white[:, 1:].imag))
+def _solve(channels: tuple[Floats, ...], at_s: Floats, arm_m: float, now: tuple[complex, float, float]) -> _Solution:
+    """Robust least squares of each channel's first column on the others, with priors; block-robust covariance."""
+    n, parts = at_s.size, len(channels)
+    y = np.concatenate([white[:, 0] for white in channels])
+    before = np.zeros((y.size, parts))
+    for part, white in enumerate(channels):
+        before[part * n : (part + 1) * n, part] = white[:, -1]
+    x = np.hstack((np.concatenate([white[:, 1:-1] for white in channels]), before))
     arm, drift, skew = now
     prior_sigma = np.array([PRIOR_SCALE, np.pi, arm_m, arm_m, PRIOR_DRIFT_RADPS, np.inf, PRIOR_SKEW])
-    prior_mean = np.array([0.0, 0.0, -arm.real, -arm.imag, -drift, 0.0, -skew])
-    precision = 1.0 / prior_sigma**2
-    weight = np.ones(y.size)
-    variance = float(np.median(y**2)) / 0.455 + 1e-12
-    for _ in range(3):
+    prior_mean = np.array([0.0, 0.0, -arm.real, -arm.imag, -drift, 0.0, -skew] + parts * [0.0])
+    e = y
+    for _ in range(4):
+        spread = np.repeat([float(np.median(np.abs(part))) / 0.6745 + 1e-6 for part in np.split(e, parts)], n)
+        weight = 1.0 / np.maximum(np.abs(e) / (HUBER * spread), 1.0)
+        variance = np.repeat([float(part.mean()) for part in np.split(weight * e**2, parts)], n) + 1e-12
+        precision = np.concatenate((1.0 / prior_sigma**2, 1.0 / variance[::n]))
         normal = (x * (weight / variance)[:, None]).T @ x + np.diag(precision)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
         inverse = np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-13) * np.outer(scale, scale)
         values = inverse @ (x.T @ (weight * y / variance) + precision * prior_mean)
         e = y - x @ values
-        size = np.abs(e[: e.size // 2] + 1j * e[e.size // 2 :])
-        spread = float(np.median(size)) / 1.1774 + 1e-9
-        w = 1.0 / np.maximum(size / (HUBER * spread), 1.0)
-        weight = np.concatenate((w, w))
-        variance = float((weight * e**2).sum() / max(e.size - x.shape[1], 1)) + 1e-12
     block = _blocks(at_s)
-    score_rows = x * (weight * e / variance)[:, None]
-    number = np.concatenate((block, block))
-    per_block = np.array([np.bincount(number, score_rows[:, k], block.max() + 1) for k in range(x.shape[1])]).T
+    number = np.tile(block, parts)
+    influence = x * (weight * e / variance)[:, None]
+    per_block = np.array([np.bincount(number, influence[:, k], block.max() + 1) for k in range(x.shape[1])]).T
     sandwich = inverse @ (per_block.T @ per_block) @ inverse
     inflate = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
-    covariance = inverse * np.outer(inflate, inflate)
-    half = e.size // 2
-    robust = weight[:half] * (e[:half] ** 2 + e[half:] ** 2)
+    robust = weight * e**2
     count = np.bincount(block)
-    cost = np.bincount(block, robust) / np.maximum(count, 1)
+    cost = np.bincount(number, robust) / count
     return _Solution(
-        values, covariance, cost[count >= 5], float(np.log(robust.mean() + 1e-18)), e[:half] + 1j * e[half:]
+        values, inverse * np.outer(inflate, inflate), cost[count >= 5], float(np.log(robust.mean() + 1e-18)), e
     )
 
 

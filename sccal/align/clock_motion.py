@@ -23,8 +23,8 @@ LATENCY_S = 0.3
 """Receivers and radio links are late by as much; what is more is a matter of clocks."""
 CLEAR_SIGMAS = 5.0
 CLEARLY_WORSE = 4.0
-"""Standard errors of the mean logarithm of the blocks' costs."""
-CLEAR_GAIN = 25.0
+WORSE_RATIO = 1.25
+"""The mean of the blocks' costs must be larger by so many standard errors, and by this factor."""
 SAME_S = 1.0
 TOGETHER_S = 10.0
 MOST_FITTED = 8
@@ -73,8 +73,12 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
         if not lags:
             return None
         wheels = mirrored
+    near = overlap and _near(lags[0], fixes)
+    glance = fit_clock(wheels, fixes, 0.0, rounds=1) if near else None
+    if glance is not None and _is_small(glance, fixes):
+        return None
     local = fit_clock(wheels, fixes, 0.0) if overlap else None
-    if local is not None and _near(lags[0], 0.0, fixes) and _keeps(local, fixes):
+    if local is not None and near and _keeps(local, fixes):
         return None
     fits = _fitted(wheels, fixes, lags, local)
     if not fits:
@@ -108,8 +112,15 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
     return None
 
 
-def _near(lag: Lag, offset_s: float, fixes: Fixes) -> bool:
-    return abs(lag.offset_s - offset_s) <= SAME_S + abs(lag.skew) * 0.5 * float(np.ptp(fixes.t_s))
+def _near(lag: Lag, fixes: Fixes) -> bool:
+    """Whether the lag may be the clocks as logged."""
+    return abs(lag.offset_s) <= SAME_S + abs(lag.skew) * 0.5 * float(np.ptp(fixes.t_s))
+
+
+def _is_small(glance: ClockFit, fixes: Fixes) -> bool:
+    """Whether one step of the fit stays far within LATENCY_S."""
+    half_s = 0.5 * float(np.ptp(fixes.t_s))
+    return max(abs(glance.at(-half_s)[0]), abs(glance.at(half_s)[0])) < 0.5 * LATENCY_S
 
 
 def _keeps(local: ClockFit, fixes: Fixes) -> bool:
@@ -141,15 +152,18 @@ def _fitted(wheels: WheelPath, fixes: Fixes, lags: list[Lag], local: ClockFit | 
 
 
 def _good(fits: list[ClockFit]) -> list[ClockFit]:
-    """Those whose innovations are not clearly larger than the smallest."""
-    logs = [np.log(fit.cost + 1e-12) for fit in fits]
-    best = min(logs, key=lambda values: float(values.mean()))
+    """Those whose innovations are not clearly larger than the smallest.
 
-    def clearly_worse(values: np.ndarray) -> bool:
-        error = np.sqrt(values.var() / values.size + best.var() / best.size)
-        return float(values.mean() - best.mean()) > CLEARLY_WORSE * max(float(error), 1e-9)
+    The blocks' scatter is taken from the best fit alone: a wrong offset may fail in one block, where the robot turned.
+    """
+    best = min((fit.cost for fit in fits), key=lambda cost: float(np.mean(cost)))
+    mean, scatter = float(best.mean()), float(best.std(ddof=1))
 
-    return [fit for fit, values in zip(fits, logs, strict=True) if not clearly_worse(values)]
+    def clearly_worse(cost: Floats) -> bool:
+        error = scatter * np.sqrt(1.0 / best.size + 1.0 / cost.size)
+        return float(cost.mean()) - mean > max(CLEARLY_WORSE * error, (WORSE_RATIO - 1.0) * mean)
+
+    return [fit for fit in fits if not clearly_worse(fit.cost)]
 
 
 def _begins_and_ends_together(good: list[ClockFit], fixes: Fixes, span_s: tuple[float, float]) -> ClockFit | None:
