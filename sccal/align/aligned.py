@@ -109,7 +109,7 @@ def align(run: Run) -> Aligned:
     wheels = _from_first_heading(wheels, heading)
     span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
 
-    t_s, timed, clock = fixes_on_host_clock(fixes, span)
+    t_s, timed, clock = fixes_on_host_clock(fixes, span, notices)
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
     t_s, clock = _clocks_by_motion(run, wheels, t_s, timed, clock, notices)
