@@ -34,9 +34,11 @@ HUBER = 2.5
 FEWEST_CELLS = 20
 BLOCK_S = 30.0
 MOST_BLOCKS = 40
+FEWEST_IN_BLOCK = 5
 SLOPE_S = 0.1
 FARTHEST_STEP_S = 2.0
 LARGEST_SKEW = 1.5e-3
+FASTEST_SKEW = 1e-3
 PRIOR_SKEW = 4e-4
 PRIOR_DRIFT_RADPS = np.radians(3.0) / 3600.0
 PRIOR_SCALE = 0.2
@@ -100,7 +102,7 @@ class ClockFit:
     covariance: Floats
     """Of (offset, skew), (2, 2), the larger of what the model and what the blocks of the log say."""
     cost: Floats
-    """Mean squared innovation (m²) in each block of the log that could be judged."""
+    """Mean squared innovation (m²) in each block of the fixes' time, NaN where the wheels do not cover it."""
     cells: int
     scale: float
     """|α|: metres by the fixes per metre by the wheels."""
@@ -116,6 +118,11 @@ class ClockFit:
     @property
     def sigma_skew(self) -> float:
         return float(np.sqrt(self.covariance[1, 1]))
+
+    @property
+    def skew_is_possible(self) -> bool:
+        """Whether a clock may run at such a rate: time daemons steer by 500 ppm."""
+        return abs(self.skew) - self.sigma_skew < FASTEST_SKEW
 
     def at(self, since_middle_s: float) -> tuple[float, float]:
         """The wheels' clock minus the fixes' so long after the fixes' middle, and its sigma."""
@@ -166,11 +173,12 @@ def fit_clock(
         if whole is None:
             return None
         rows, at_s = whole
+        blocks = _blocks(at_s[1:], fixes.t_s)
         if filters is None and round_ >= min(2, rounds):
-            filters = _choose_filters(rows, at_s, wheels.arm_m)
+            filters = _choose_filters(rows, at_s, blocks, wheels.arm_m)
         use = filters if filters is not None else Filters(False, ((_memory(15.0, at_s), np.zeros(0)),) * 2)
         white = _whitened(_steps(rows, at_s, use.in_body), use)
-        solution = _solve(white, at_s[1:], wheels.arm_m, (arm, drift, skew))
+        solution = _solve(white, blocks, wheels.arm_m, (arm, drift, skew))
         if rounds == 0 or round_ == rounds:
             break
         step, step_skew = float(solution.values[5]), float(solution.values[6])
@@ -187,7 +195,7 @@ def fit_clock(
         offset_s,
         skew,
         solution.covariance[5:7, 5:7],
-        solution.cost,
+        _cost(solution, blocks, fixes.t_s),
         at_s.size,
         float(abs(alpha)),
         covered,
@@ -273,7 +281,7 @@ def _whitened(steps: tuple[Floats, Floats], filters: Filters) -> tuple[Floats, F
     return _filtered(a, *for_a), _filtered(b, *for_b)
 
 
-def _choose_filters(rows: Complexes, at_s: Floats, arm_m: float) -> Filters:
+def _choose_filters(rows: Complexes, at_s: Floats, blocks: Ints, arm_m: float) -> Filters:
     """By likelihood: the channels, λ for each of them, and then an autoregression of what correlation is left."""
     nothing = np.zeros(0)
     tried: list[tuple[float, Filters]] = []
@@ -284,7 +292,7 @@ def _choose_filters(rows: Complexes, at_s: Floats, arm_m: float) -> Filters:
             fits = []
             for memory_s in MEMORIES_S:
                 lam = _memory(memory_s, at_s)
-                solution = _solve((_filtered(channel, lam, nothing),), at_s[1:], arm_m, (0j, 0.0, 0.0))
+                solution = _solve((_filtered(channel, lam, nothing),), blocks, arm_m, (0j, 0.0, 0.0))
                 fits.append((solution.score, lam, solution.residual))
             best.append(min(fits, key=lambda fit: fit[0]))
         (score_a, lam_a, left_a), (score_b, lam_b, left_b) = best
@@ -308,14 +316,14 @@ def _yule_walker(e: Floats) -> Floats:
 class _Solution:
     values: Floats
     covariance: Floats
-    cost: Floats
+    squared: Floats
     score: float
     residual: Floats
 
 
-def _solve(channels: tuple[Floats, ...], at_s: Floats, arm_m: float, now: tuple[complex, float, float]) -> _Solution:
+def _solve(channels: tuple[Floats, ...], block: Ints, arm_m: float, now: tuple[complex, float, float]) -> _Solution:
     """Robust least squares of each channel's first column on the others, with priors; block-robust covariance."""
-    n, parts = at_s.size, len(channels)
+    n, parts = block.size, len(channels)
     y = np.concatenate([white[:, 0] for white in channels])
     before = np.zeros((y.size, parts))
     for part, white in enumerate(channels):
@@ -335,22 +343,25 @@ def _solve(channels: tuple[Floats, ...], at_s: Floats, arm_m: float, now: tuple[
         inverse = np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-13) * np.outer(scale, scale)
         values = inverse @ (x.T @ (weight * y / variance) + precision * prior_mean)
         e = y - x @ values
-    block = _blocks(at_s)
     number = np.tile(block, parts)
     influence = x * (weight * e / variance)[:, None]
     per_block = np.array([np.bincount(number, influence[:, k], block.max() + 1) for k in range(x.shape[1])]).T
     sandwich = inverse @ (per_block.T @ per_block) @ inverse
     inflate = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
     robust = weight * e**2
-    count = np.bincount(block)
-    cost = np.bincount(number, robust) / count
     return _Solution(
-        values, inverse * np.outer(inflate, inflate), cost[count >= 5], float(np.log(robust.mean() + 1e-18)), e
+        values, inverse * np.outer(inflate, inflate), robust.reshape(parts, n).sum(0), float(np.log(robust.mean() + 1e-18)), e
     )
 
 
-def _blocks(at_s: Floats) -> Ints:
-    """Number of the block of the log in which each cell lies (n,)."""
-    width = max(BLOCK_S, float(np.ptp(at_s)) / MOST_BLOCKS)
-    number = np.floor((at_s - at_s[0]) / width).astype(np.int64)
-    return np.unique(number, return_inverse=True)[1]
+def _blocks(at_s: Floats, all_t_s: Floats) -> Ints:
+    """Number of the block of the fixes' time in which each cell lies (n,): the same whatever the offset."""
+    width = max(BLOCK_S, float(np.ptp(all_t_s)) / MOST_BLOCKS)
+    return np.floor((at_s - all_t_s[0]) / width).astype(np.int64)
+
+
+def _cost(solution: _Solution, block: Ints, all_t_s: Floats) -> Floats:
+    blocks = int(_blocks(all_t_s[-1:], all_t_s)[0]) + 1
+    count = np.bincount(block, minlength=blocks)
+    total = np.bincount(block, solution.squared, minlength=blocks)
+    return np.where(count >= FEWEST_IN_BLOCK, total / np.maximum(count, 1), np.nan)

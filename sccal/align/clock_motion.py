@@ -25,7 +25,13 @@ CLEAR_SIGMAS = 5.0
 CLEARLY_WORSE = 4.0
 WORSE_RATIO = 1.25
 """The mean of the blocks' costs must be larger by so many standard errors, and by this factor."""
+MUCH_WORSE = 6.0
+"""Of a block's cost: noise does not make it so much larger."""
+MOST_COVERED = 0.97
+"""An offset that leaves out more of the motion than the clocks as logged must not win by what it leaves out."""
 SAME_S = 1.0
+NEAR_S = 2.0
+"""Within this a fit that starts at the clocks as logged has not run away to another part of the drive."""
 TOGETHER_S = 10.0
 MOST_FITTED = 8
 FEWEST_BLOCKS = 3
@@ -37,16 +43,21 @@ KNOWN_S = 0.3
 class MotionClock:
     """What to add to the fixes' times: offset + skew · (t − reference)."""
 
-    fit: ClockFit
+    fit: ClockFit | None
+    """None: the clocks stay as logged."""
     reference_s: float
     notices: tuple[Notice, ...]
 
     def moved(self, t_s: Floats) -> Floats:
         """Times of fixes (n,) on the wheels' clock."""
+        if self.fit is None:
+            return t_s
         return np.asarray(t_s + (self.fit.offset_s + self.fit.skew * (t_s - self.reference_s)))
 
     def after(self, clock: Clock) -> Clock:
         """Both steps as one clock: how the fixes had their times, and then this."""
+        if self.fit is None:
+            return clock
         return replace(
             clock,
             source="motion",
@@ -77,15 +88,31 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
     glance = fit_clock(wheels, fixes, 0.0, rounds=1) if near else None
     if glance is not None and _is_small(glance, fixes):
         return None
-    local = fit_clock(wheels, fixes, 0.0) if overlap else None
-    if local is not None and near and _keeps(local, fixes):
+    local = fit_clock(wheels, fixes, 0.0) if near else None
+    if local is not None and _keeps(local, fixes):
         return None
-    fits = _fitted(wheels, fixes, lags, local)
+    if local is not None and abs(local.offset_s) < NEAR_S and local.skew_is_possible:
+        as_it_stands = fit_clock(wheels, fixes, 0.0, filters=local.filters, rounds=0)
+        if as_it_stands is not None and not _fails_elsewhere(local, as_it_stands):
+            return MotionClock(local, fixes.middle_s, (_told(local, fixes),))
+    fits = _fitted(wheels, fixes, lags)
     if not fits:
         return None
     good = _good(fits)
-    if local is not None and _keeps(local, fixes) and any(abs(f.offset_s) < SAME_S for f in good):
-        return None
+    logged = _as_logged(wheels, fixes, good[0]) if overlap else None
+    if logged is not None:
+        if not all(_clearly_worse(logged, fit) for fit in good):
+            return None
+        steady = [
+            fit
+            for fit in good
+            if not _fails_elsewhere(fit, logged)
+            and fit.covered > MOST_COVERED * logged.covered
+            and fit.skew_is_possible
+        ]
+        if not steady:
+            return MotionClock(None, 0.0, (_disagree_in_part(good[0], fixes),))
+        good = steady
     chosen = good[0]
     notices: list[Notice] = []
     if len(good) > 1:
@@ -135,35 +162,57 @@ def _mismatch_is_clear(fit: ClockFit, half_s: float) -> bool:
     )
 
 
-def _fitted(wheels: WheelPath, fixes: Fixes, lags: list[Lag], local: ClockFit | None) -> list[ClockFit]:
+def _as_logged(wheels: WheelPath, fixes: Fixes, like: ClockFit) -> ClockFit | None:
+    """The clocks as logged, fitted if that stays within a latency, else as they stand; under the same noise."""
+    fit = fit_clock(wheels, fixes, 0.0, filters=like.filters)
+    if fit is not None and _keeps(fit, fixes):
+        return fit
+    return fit_clock(wheels, fixes, 0.0, filters=like.filters, rounds=0)
+
+
+def _fails_elsewhere(found: ClockFit, logged: ClockFit) -> bool:
+    """Whether some fixes that fit as logged do not fit at the offset found: then it is not the clocks that are off."""
+    common = np.isfinite(found.cost) & np.isfinite(logged.cost)
+    if not common.any():
+        return False
+    usual = float(np.median(np.minimum(found.cost, logged.cost)[common]))
+    return bool(((found.cost > MUCH_WORSE * usual) & (logged.cost < found.cost / MUCH_WORSE))[common].any())
+
+
+def _fitted(wheels: WheelPath, fixes: Fixes, lags: list[Lag]) -> list[ClockFit]:
     """The lags refined, all under the noise of the best of them; distinct ones, most explained first."""
     first = fit_clock(wheels, fixes, lags[0].offset_s, lags[0].skew)
     if first is None:
         return []
-    starts = [(lag.offset_s, lag.skew) for lag in lags[1:MOST_FITTED]]
-    if local is not None:
-        starts.append((0.0, 0.0))
     fits = [first]
-    for offset_s, skew in starts:
-        fit = fit_clock(wheels, fixes, offset_s, skew, first.filters)
+    for lag in lags[1:MOST_FITTED]:
+        fit = fit_clock(wheels, fixes, lag.offset_s, lag.skew, first.filters)
         if fit is not None and all(abs(fit.offset_s - other.offset_s) > SAME_S for other in fits):
             fits.append(fit)
-    return [fit for fit in fits if fit.cost.size >= FEWEST_BLOCKS]
+    return [fit for fit in fits if int(np.isfinite(fit.cost).sum()) >= FEWEST_BLOCKS]
 
 
 def _good(fits: list[ClockFit]) -> list[ClockFit]:
-    """Those whose innovations are not clearly larger than the smallest.
+    """Those that are not clearly worse than the best."""
+    best = min(fits, key=lambda fit: float(np.nanmean(fit.cost)))
+    return [fit for fit in fits if not _clearly_worse(fit, best)]
 
-    The blocks' scatter is taken from the best fit alone: a wrong offset may fail in one block, where the robot turned.
+
+def _clearly_worse(one: ClockFit, other: ClockFit) -> bool:
+    """Whether the innovations of the same fixes are clearly larger under one fit than under the other.
+
+    Fixes that only one of them explains do not count: frozen or disturbed fixes fit nothing, and would be best left
+    out. The blocks' scatter is the better fit's alone: a wrong offset may fail in one block, where the robot turned.
     """
-    best = min((fit.cost for fit in fits), key=lambda cost: float(np.mean(cost)))
-    mean, scatter = float(best.mean()), float(best.std(ddof=1))
-
-    def clearly_worse(cost: Floats) -> bool:
-        error = scatter * np.sqrt(1.0 / best.size + 1.0 / cost.size)
-        return float(cost.mean()) - mean > max(CLEARLY_WORSE * error, (WORSE_RATIO - 1.0) * mean)
-
-    return [fit for fit in fits if not clearly_worse(fit.cost)]
+    common = np.isfinite(one.cost) & np.isfinite(other.cost)
+    if int(common.sum()) < FEWEST_BLOCKS:
+        common_one, common_other = np.isfinite(one.cost), np.isfinite(other.cost)
+    else:
+        common_one = common_other = common
+    usual, scatter = float(other.cost[common_other].mean()), float(other.cost[common_other].std(ddof=1))
+    error = scatter * np.sqrt(1.0 / common_one.sum() + 1.0 / common_other.sum())
+    excess = float(one.cost[common_one].mean()) - usual
+    return excess > max(CLEARLY_WORSE * float(error), (WORSE_RATIO - 1.0) * usual)
 
 
 def _begins_and_ends_together(good: list[ClockFit], fixes: Fixes, span_s: tuple[float, float]) -> ClockFit | None:
@@ -178,6 +227,15 @@ def _begins_and_ends_together(good: list[ClockFit], fixes: Fixes, span_s: tuple[
     order = sorted(good, key=apart)
     nearest, next_ = apart(order[0]), apart(order[1])
     return order[0] if nearest < TOGETHER_S and next_ > 3.0 * nearest + TOGETHER_S else None
+
+
+def _disagree_in_part(found: ClockFit, fixes: Fixes) -> Notice:
+    what = (
+        f"fixes of which part fits the wheels as logged, and part does not (it would at an offset of "
+        f"{found.offset_s:+.2f} s, or a stream is frozen or disturbed); clocks left as logged"
+    )
+    doubt = "part of the fixes does not fit the wheels' motion: one of the streams is shifted in time, frozen or disturbed"
+    return Notice("gnss", what, int(fixes.t_s.size), "", "warning", doubt)
 
 
 def _told(fit: ClockFit, fixes: Fixes) -> Notice:
