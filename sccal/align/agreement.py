@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sccal.align.path import laid_out
 from sccal.align.signs import slope_through_origin, wheel_turn
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
@@ -27,6 +28,7 @@ ENOUGH_TURN_RAD = np.radians(120.0)
 TOGETHER = 0.6
 MOVE_WINDOW_S = 2.0
 CELL_S = 1.0
+PATH_RATE_HZ = 20.0
 CLEAR_SIGMAS = 5.0
 SCALE_ERROR = 0.08
 """Of a displacement: radii, slip and a heading's error may be off by so much in a window."""
@@ -96,17 +98,17 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     fixes = aligned.fix_east_m[rows] + 1j * aligned.fix_north_m[rows]
     if rows.size < FEWEST_MOVES or np.ptp(fix_t_s) < FEWEST_MOVES * MOVE_WINDOW_S:
         return []
-    antenna = _antenna_path(aligned, fixes, fix_t_s)
-    path = np.interp(fix_t_s, aligned.wheel_t_s, antenna)
+    wheel_t_s, antenna = _antenna_path(aligned, fixes, fix_t_s)
+    path = np.interp(fix_t_s, wheel_t_s, antenna)
     left = fixes - path
-    window_s = _window_s(antenna, aligned.wheel_t_s, left, fix_t_s)
+    window_s = _window_s(antenna, wheel_t_s, left, fix_t_s)
     t_s = np.arange(fix_t_s[0], fix_t_s[-1], window_s)
 
     def by_wheels(lag_s: float) -> Floats:
-        return np.asarray(np.abs(np.diff(np.interp(t_s + lag_s, aligned.wheel_t_s, antenna))))
+        return np.asarray(np.abs(np.diff(np.interp(t_s + lag_s, wheel_t_s, antenna))))
 
     moved = by_wheels(0.0)
-    by_fixes = np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, antenna) + _settled(left, fix_t_s, t_s)))
+    by_fixes = np.abs(np.diff(np.interp(t_s, wheel_t_s, antenna) + _settled(left, fix_t_s, t_s)))
     watched = np.diff(np.interp(t_s, fix_t_s, np.arange(rows.size))) > 0.5
     chunks = [part[watched[part]] for part in _chunks(t_s[:-1])]
     chunks = [part for part in chunks if part.size * window_s > 0.5 * CHUNK_S]
@@ -118,7 +120,9 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     apart: list[float] = []
     judged = 0
     for part in chunks:
-        if (np.maximum(moved, by_fixes)[part] > CLEAR_SIGMAS * sigma[part]).sum() < few_apart and not frozen[part].any():
+        if (np.maximum(moved, by_fixes)[part] > CLEAR_SIGMAS * sigma[part]).sum() < few_apart and not frozen[
+            part
+        ].any():
             continue
         judged += 1
         off = (by_fixes[part] - moved[part]) / sigma[part]
@@ -143,13 +147,16 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     return [Notice("gnss", what, len(apart), f"t = {apart[0]:.0f} s", "warning", doubt)]
 
 
-def _antenna_path(aligned: Aligned, fixes: Complexes, t_s: Floats) -> Complexes:
-    """Where wheels and yaw take the antenna (n,), at the wheels' times, turned, scaled and placed as the fixes want it.
+def _antenna_path(aligned: Aligned, fixes: Complexes, t_s: Floats) -> tuple[Floats, Complexes]:
+    """Where wheels and yaw take the antenna, times (n,) and places (n,), turned and scaled as the fixes want it.
 
     From displacements over MOVE_WINDOW_S, robustly, so that neither drift nor a bad stretch matters.
     """
-    columns = np.column_stack((aligned.path_along_yaw, np.exp(1j * aligned.yaw_at_wheels_rad)))
-    at_fixes = np.column_stack([np.interp(t_s, aligned.wheel_t_s, column) for column in columns.T])
+    every = max(1, round(1.0 / (PATH_RATE_HZ * max(float(np.median(np.diff(aligned.wheel_t_s))), 1e-6))))
+    wheel_t_s = aligned.wheel_t_s[::every]
+    yaw = np.interp(wheel_t_s, aligned.heading_t_s, aligned.yaw_rad)
+    columns = (laid_out(aligned.travel_m[::every], yaw), np.exp(1j * yaw))
+    at_fixes = np.column_stack([np.interp(t_s, wheel_t_s, column) for column in columns])
     later = np.searchsorted(t_s, t_s + MOVE_WINDOW_S)
     first = np.flatnonzero(later < t_s.size)
     x, y = at_fixes[later[first]] - at_fixes[first], fixes[later[first]] - fixes[first]
@@ -162,7 +169,7 @@ def _antenna_path(aligned: Aligned, fixes: Complexes, t_s: Floats) -> Complexes:
         weight = 1.0 / np.maximum(off / max(float(np.median(off)), 1e-3), 1.0)
     if not SCALES[0] < abs(solution[0]) < SCALES[1] or abs(solution[1]) > LONGEST_ARM * aligned.vehicle.track_m:
         solution = np.array([1.0, 0.0], dtype=complex)
-    return np.asarray(columns @ solution)
+    return wheel_t_s, columns[0] * solution[0] + columns[1] * solution[1]
 
 
 def _window_s(antenna: Complexes, wheel_t_s: Floats, left: Complexes, fix_t_s: Floats) -> float:
@@ -177,10 +184,15 @@ def _settled(left: Complexes, fix_t_s: Floats, t_s: Floats) -> Complexes:
     """Medians of what the path leaves of the fixes, over CELL_S around each time: single outliers are gone."""
     number = np.floor((fix_t_s - fix_t_s[0]) / CELL_S).astype(np.int64)
     starts = np.flatnonzero(np.concatenate(([True], np.diff(number) > 0)))
-    parts = np.split(left, starts[1:])
-    middle = np.array([complex(np.median(part.real), np.median(part.imag)) for part in parts])
-    at = np.add.reduceat(fix_t_s, starts) / np.diff(np.append(starts, fix_t_s.size))
-    return np.asarray(np.interp(t_s, at, middle))
+    count = np.diff(np.append(starts, fix_t_s.size))
+    lower, upper = starts + (count - 1) // 2, starts + count // 2
+
+    def medians(values: Floats) -> Floats:
+        ordered = values[np.lexsort((values, number))]
+        return np.asarray(0.5 * (ordered[lower] + ordered[upper]))
+
+    at = np.add.reduceat(fix_t_s, starts) / count
+    return np.asarray(np.interp(t_s, at, medians(left.real) + 1j * medians(left.imag)))
 
 
 def _spread(off_m: Floats, left: Complexes, fix_t_s: Floats, t_s: Floats, chunks: list[Ints]) -> Floats:

@@ -201,7 +201,7 @@ def _clocks_by_motion(
     rows, sigma = rows[leading], float(np.sqrt(np.median((var_east + var_north)[leading]) / 2.0))
     plane = TangentPlane(float(fixes.lat_deg[rows[0]]), float(fixes.lon_deg[rows[0]]), 0.0)
     east, north = plane.to_east_north(fixes.lat_deg[rows], fixes.lon_deg[rows])
-    every = max(1, round(WHEEL_RATE_HZ ** -1 / max(float(np.median(np.diff(wheels.t_s))), 1e-6)))
+    every = max(1, round(WHEEL_RATE_HZ**-1 / max(float(np.median(np.diff(wheels.t_s))), 1e-6)))
     covered = (wheels.t_s >= run.heading.t_s[0]) & (wheels.t_s <= run.heading.t_s[-1])
     index = np.flatnonzero(covered)[::every]
     if index.size < MIN_MEASUREMENTS:

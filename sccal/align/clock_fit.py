@@ -6,8 +6,8 @@ p is the wheels' travel laid along the yaw, α turns and scales it, b is the ant
 What is left is a random walk (slip, and heading errors while driving) under white noise of the fixes. Its innovations
 are a linear filter, e = (1 − L) / (1 − λL), so filtering the residual and its derivatives alike and then taking least
 squares is generalised least squares. λ is chosen by likelihood, a short autoregression takes what correlation is left,
-and blocks of the log tell whether the sigmas are too small. The antenna's place and the drift of the heading have priors:
-at one speed the first is an offset, on a circle the second is a skew.
+and blocks of the log tell whether the sigmas are too small. The antenna's place and the drift of the heading have
+priors: at one speed the first is an offset, on a circle the second is a skew.
 """
 
 from __future__ import annotations
@@ -241,14 +241,14 @@ def _cells(t_s: Floats, rows: Complexes, left: Complexes) -> tuple[Complexes, Fl
     if start.size < FEWEST_CELLS:
         return None
     count = np.diff(np.append(start, t_s.size))
-    return np.add.reduceat(rows, start, axis=0) / count[:, None], np.add.reduceat(t_s, start) / count
+    mean = np.asarray(np.add.reduceat(rows, start, axis=0) / count[:, None], dtype=np.complex128)
+    return mean, np.add.reduceat(t_s, start) / count
 
 
 def _no_outliers(left: Complexes) -> Bools:
     """Residuals (n,) that lie near the running median of their neighbours."""
-    off = np.abs(
-        left - (median_filter(left.real, NEIGHBOURS, mode="nearest") + 1j * median_filter(left.imag, NEIGHBOURS, mode="nearest"))
-    )
+    east, north = (median_filter(part, NEIGHBOURS, mode="nearest") for part in (left.real, left.imag))
+    off = np.hypot(left.real - east, left.imag - north)
     usual = float(np.median(off))
     return np.asarray(off <= OUTLIER_SPREADS * max(1.48 * usual, 1e-3))
 
@@ -296,7 +296,8 @@ def _choose_filters(rows: Complexes, at_s: Floats, blocks: Ints, arm_m: float) -
                 fits.append((solution.score, lam, solution.residual))
             best.append(min(fits, key=lambda fit: fit[0]))
         (score_a, lam_a, left_a), (score_b, lam_b, left_b) = best
-        tried.append((score_a + score_b, Filters(in_body, ((lam_a, _yule_walker(left_a)), (lam_b, _yule_walker(left_b))))))
+        channels = ((lam_a, _yule_walker(left_a)), (lam_b, _yule_walker(left_b)))
+        tried.append((score_a + score_b, Filters(in_body, channels)))
     return min(tried, key=lambda each: each[0])[1]
 
 
@@ -349,15 +350,14 @@ def _solve(channels: tuple[Floats, ...], block: Ints, arm_m: float, now: tuple[c
     sandwich = inverse @ (per_block.T @ per_block) @ inverse
     inflate = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(inverse), 1e-300), 1.0))
     robust = weight * e**2
-    return _Solution(
-        values, inverse * np.outer(inflate, inflate), robust.reshape(parts, n).sum(0), float(np.log(robust.mean() + 1e-18)), e
-    )
+    score = float(np.log(robust.mean() + 1e-18))
+    return _Solution(values, inverse * np.outer(inflate, inflate), robust.reshape(parts, n).sum(0), score, e)
 
 
 def _blocks(at_s: Floats, all_t_s: Floats) -> Ints:
     """Number of the block of the fixes' time in which each cell lies (n,): the same whatever the offset."""
     width = max(BLOCK_S, float(np.ptp(all_t_s)) / MOST_BLOCKS)
-    return np.floor((at_s - all_t_s[0]) / width).astype(np.int64)
+    return np.asarray(np.floor((at_s - all_t_s[0]) / width).astype(np.int64))
 
 
 def _cost(solution: _Solution, block: Ints, all_t_s: Floats) -> Floats:

@@ -2,7 +2,8 @@
 
 Lags at which both streams move together come from `clock_search`, their offset and skew from `clock_fit`. A drive may
 repeat itself (laps, rows, a circle at one speed), so several offsets may fit equally well: then clocks that agree as
-logged are left alone; else the only offset at which both streams begin and end together is taken; else nothing is guessed.
+logged are left alone; else the only offset at which both streams begin and end together is taken; else nothing is
+guessed.
 A mismatch that a late receiver could make is left too: a latency and a skew of that size are effects, and diagnosed.
 """
 
@@ -113,25 +114,7 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
         if not steady:
             return MotionClock(None, 0.0, (_disagree_in_part(good[0], fixes),))
         good = steady
-    chosen = good[0]
-    notices: list[Notice] = []
-    if len(good) > 1:
-        together = _begins_and_ends_together(good, fixes, span_s)
-        others = ", ".join(f"{f.offset_s:+.2f} s" for f in good[:5])
-        if together is not None:
-            chosen = together
-            what = f"offsets between the clocks fit the motion equally well ({others}); taken the one at which both streams begin and end together"
-            notices.append(Notice("gnss", what, len(good)))
-        elif not overlap:
-            raise DataError(
-                f"the fixes and encoder.csv share no time as logged, and the drive repeats itself: {len(good)} offsets between "
-                f"their clocks fit equally well ({others}): log the receive time before each NMEA line, or stand still once"
-            )
-        else:
-            chosen = max(good, key=lambda f: (round(f.covered, 2), -abs(f.offset_s)))
-            doubt = f"the clock of the fixes is off, and the drive repeats itself: {others} fit equally well"
-            what = f"offsets between the clocks fit the motion equally well ({others}): log receive times"
-            notices.append(Notice("gnss", what, len(good), "", "warning", doubt))
+    chosen, notices = (good[0], []) if len(good) == 1 else _one_of(good, fixes, span_s, overlap)
     half_s = 0.5 * float(np.ptp(fixes.t_s))
     if not overlap or _mismatch_is_clear(chosen, half_s):
         notices.insert(0, _told(chosen, fixes))
@@ -215,6 +198,27 @@ def _clearly_worse(one: ClockFit, other: ClockFit) -> bool:
     return excess > max(CLEARLY_WORSE * float(error), (WORSE_RATIO - 1.0) * usual)
 
 
+def _one_of(
+    good: list[ClockFit], fixes: Fixes, span_s: tuple[float, float], overlap: bool
+) -> tuple[ClockFit, list[Notice]]:
+    """Which of several offsets that fit equally well to take, and what to say about it; DataError where none may be."""
+    others = ", ".join(f"{fit.offset_s:+.2f} s" for fit in good[:5])
+    together = _begins_and_ends_together(good, fixes, span_s)
+    what = f"offsets between the clocks fit the motion equally well ({others}): "
+    if together is not None:
+        what += "taken the one at which both streams begin and end together"
+        return together, [Notice("gnss", what, len(good))]
+    if not overlap:
+        raise DataError(
+            f"the fixes and encoder.csv share no time as logged, and the drive repeats itself: {len(good)} offsets "
+            f"between their clocks fit equally well ({others}): log the receive time before each NMEA line, "
+            "or stand still once in a while"
+        )
+    doubt = f"the clock of the fixes is off, and the drive repeats itself: {others} fit equally well"
+    chosen = max(good, key=lambda fit: (round(fit.covered, 2), -abs(fit.offset_s)))
+    return chosen, [Notice("gnss", what + "log receive times", len(good), "", "warning", doubt)]
+
+
 def _begins_and_ends_together(good: list[ClockFit], fixes: Fixes, span_s: tuple[float, float]) -> ClockFit | None:
     """The one fit under which both streams begin and end within TOGETHER_S of each other, if no other comes near."""
     half = 0.5 * float(np.ptp(fixes.t_s))
@@ -234,7 +238,9 @@ def _disagree_in_part(found: ClockFit, fixes: Fixes) -> Notice:
         f"fixes of which part fits the wheels as logged, and part does not (it would at an offset of "
         f"{found.offset_s:+.2f} s, or a stream is frozen or disturbed); clocks left as logged"
     )
-    doubt = "part of the fixes does not fit the wheels' motion: one of the streams is shifted in time, frozen or disturbed"
+    doubt = (
+        "part of the fixes does not fit the wheels' motion: one of the streams is shifted in time, frozen or disturbed"
+    )
     return Notice("gnss", what, int(fixes.t_s.size), "", "warning", doubt)
 
 

@@ -86,8 +86,10 @@ def _displacements(t_s: Floats, z: Complexes, window_s: float) -> tuple[Complexe
     on_grid = np.interp(centre, at, mean)
     after = np.minimum(np.searchsorted(at, centre), at.size - 1)
     gap = at[after] - at[np.maximum(after - 1, 0)]
-    known = (gap <= max(LONGEST_GAP_S, 3.0 * float(np.median(np.diff(at))))) & (centre >= at[0] - GRID_S) & (
-        centre <= at[-1] + GRID_S
+    known = (
+        (gap <= max(LONGEST_GAP_S, 3.0 * float(np.median(np.diff(at)))))
+        & (centre >= at[0] - GRID_S)
+        & (centre <= at[-1] + GRID_S)
     )
     steps = round(window_s / GRID_S)
     if grid.size <= steps + 1:
@@ -115,7 +117,8 @@ def _lags_at(wheels: WheelPath, fixes: Fixes, skew: float, window_s: float) -> l
         both = ifft(np.conj(a) * b)
         return np.concatenate((both[-(d_fix.size - 1) :], both[: d_wheel.size]))
 
-    fix_f, wheel_f, has_fix_f, has_wheel_f = map(transform, (d_fix, d_wheel, has_fix, has_wheel))
+    fix_f, wheel_f = transform(d_fix), transform(d_wheel)
+    has_fix_f, has_wheel_f = transform(has_fix), transform(has_wheel)
     power_fix_f, power_wheel_f = transform(np.abs(d_fix) ** 2), transform(np.abs(d_wheel) ** 2)
     cross = np.abs(correlate(fix_f, wheel_f)) ** 2
     count = correlate(has_fix_f, has_wheel_f).real
@@ -137,6 +140,4 @@ def _lags_at(wheels: WheelPath, fixes: Fixes, skew: float, window_s: float) -> l
     peaks = peaks[np.argsort(-explained[peaks])[:24]]
     starts = float(wheels.t_s[0] - t_s[0])
     first = -(d_fix.size - 1)
-    return [
-        Lag(starts + float(k + first) * GRID_S, skew, float(coherence[k]), float(explained[k])) for k in peaks
-    ]
+    return [Lag(starts + float(k + first) * GRID_S, skew, float(coherence[k]), float(explained[k])) for k in peaks]

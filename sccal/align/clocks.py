@@ -14,9 +14,9 @@ from typing import Literal
 
 import numpy as np
 
+from sccal.align.receive_times import Delay, fit_delay
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
-from sccal.align.receive_times import Delay, fit_delay
 from sccal.logs.streams import FixStream, Notice
 
 DAY_S = 86400.0
@@ -76,8 +76,9 @@ def fixes_on_host_clock(
     if np.isfinite(host).any():
         return host, np.isfinite(host), Clock("host", 0.0, 0.0, 0.0, 2)
     t_s = _in_the_era_of(utc, span_s, told) if fixes.utc_has_date else _on_the_day_of(utc, span_s)
-    shift = float(np.nanmedian(t_s - utc)) if fixes.utc_has_date else 0.0
-    return t_s, np.isfinite(t_s), Clock("utc", shift, 0.0, 0.0, 2)
+    timed = np.isfinite(t_s)
+    shift = float((t_s - utc)[timed][0]) if fixes.utc_has_date and timed.any() else 0.0
+    return t_s, timed, Clock("utc", shift, 0.0, 0.0, 2)
 
 
 def require_overlap(t_s: Floats, span_s: tuple[float, float], clock: Clock, what: str) -> None:
@@ -86,7 +87,8 @@ def require_overlap(t_s: Floats, span_s: tuple[float, float], clock: Clock, what
         return
     seen = f"{t_s[0]:.3f} … {t_s[-1]:.3f} s" if t_s.size else "no usable rows"
     advice = (
-        "without receive times before the NMEA lines, t in encoder.csv and ahrs.csv must be Unix time (UTC)"
+        "without receive times before the NMEA lines, t in encoder.csv and ahrs.csv must be Unix time (UTC), "
+        "and the motion shows no other offset between the clocks"
         if clock.source == "utc"
         else "all streams must share the logging computer's clock"
     )
@@ -102,6 +104,8 @@ def _on_the_day_of(time_of_day_s: Floats, span_s: tuple[float, float]) -> Floats
 
 def _in_the_era_of(utc_s: Floats, span_s: tuple[float, float], notices: list[Notice]) -> Floats:
     """Epochs whose dates are whole GPS eras off the wheels' Unix time put right; others as they are."""
+    if not np.isfinite(utc_s).any():
+        return utc_s
     away = 0.5 * (span_s[0] + span_s[1]) - float(np.nanmedian(utc_s))
     eras = round(away / ERA_S)
     if eras == 0 or abs(away - eras * ERA_S) > DAY_S:
@@ -127,5 +131,5 @@ def _tell_delay(
     if found.step_s.size:
         sizes = ", ".join(f"{-size:+.2f} s" for size in found.step_s[:5])
         first = f"UTC {np.datetime64(round(1e3 * (centre_s + found.step_at_s[0])), 'ms')}"
-        what = f"steps of the receiver's time against the logging clock mended ({sizes}): leap seconds, or a clock was set"
+        what = f"steps of the receiver's time against the logging clock mended ({sizes}): leap seconds, or a clock set"
         notices.append(Notice("gnss", what, int(found.step_s.size), first, "warning"))

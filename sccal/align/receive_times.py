@@ -2,8 +2,8 @@
 
 Lines arrive late, never early: buffers are flushed seconds later, several lines at once. What is late for sure is left
 out, the rest is fitted robustly by a continuous, piecewise linear delay, and the fit is moved onto the earliest lines.
-How many corners it has is decided by the Bayesian information criterion. Where the delay jumps for good (a receiver that
-learns of leap seconds, a clock that is set), the fit has a step.
+How many corners it has is decided by the Bayesian information criterion. Where the delay jumps for good (a receiver
+that learns of leap seconds, a clock that is set), the fit has a step.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ STEP_S = 0.5
 STEP_WINDOW_S = 10.0
 LEAP_TOLERANCE_S = 0.3
 """Where the epochs leap by about the step, the step is there."""
+EARLY_S = 0.2
+"""More than clocks drift within STEP_WINDOW_S, and than the fastest lines differ."""
 FEWEST_BESIDE = 5
 MOST_LATE = 0.9
 
@@ -113,19 +115,14 @@ def _steps(utc_s: Floats, delay_s: Floats) -> tuple[Floats, Floats]:
     for group in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
         first, last = max(int(group[0]) - beside, 0), min(int(group[-1]) + beside, utc_s.size)
         low, high = before[group[0]], after[group[-1]]
-        leaps = first + np.flatnonzero(np.abs(np.diff(utc_s[first:last]) - usual_s + (high - low)) < LEAP_TOLERANCE_S) + 1
+        beyond_s = np.diff(utc_s[first:last]) - usual_s
+        leaps = first + 1 + np.flatnonzero(np.abs(beyond_s + (high - low)) < LEAP_TOLERANCE_S)
         if leaps.size == 1:
-            at.append(int(leaps[0]))
-            size.append(float(high - low))
-            continue
-        around = delay_s[first:last]
-        # Lines before the step fit its lower side, lines behind the other; late ones count as a second at most.
-        fits_before = np.minimum(np.abs(around - low), 1.0)
-        fits_after = np.minimum(np.abs(around - high), 1.0)
-        cost = np.concatenate(([0.0], np.cumsum(fits_before))) + np.concatenate(
-            (np.cumsum(fits_after[::-1])[::-1], [0.0])
-        )
-        row = first + int(np.argmin(cost))
+            row = int(leaps[0])
+        else:
+            # No line is early: one below the upper level stands on the lower level's side of the step.
+            lower = first + np.flatnonzero(delay_s[first:last] < max(low, high) - EARLY_S)
+            row = int(lower[-1]) + 1 if high > low else int(lower[0])
         if 0 < row < utc_s.size:
             at.append(row)
             size.append(float(high - low))

@@ -61,7 +61,8 @@ def clock_line(clock: Clock) -> str:
         return "fixes at their receive times, as logged"
     offset, skew = _with_sigma(clock.offset_s, clock.sigma_offset_s), _with_sigma(clock.skew_ppm, clock.sigma_skew_ppm)
     if clock.source == "motion":
-        return f"fixes put on the wheels' clock by their motion: {offset} s, skew {skew} ppm (a latency of the receiver included)"
+        what = "fixes put on the wheels' clock by their motion"
+        return f"{what}: {offset} s, skew {skew} ppm (a latency of the receiver included)"
     way = "the logging clock is Unix time" if clock.source == "utc" else "receiver epochs mapped onto the logging clock"
     steered = f", steered ({clock.knots} knots)" if clock.knots > 2 else ""
     jitter = plain(1e3 * clock.jitter_s, 2) if math.isfinite(clock.jitter_s) else MISSING
