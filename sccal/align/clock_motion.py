@@ -38,6 +38,8 @@ MOST_FITTED = 8
 FEWEST_BLOCKS = 3
 KNOWN_S = 0.3
 """An offset less certain than this is a doubt."""
+KNOWN_HEADING_DEG = 0.05
+"""And so is one that leaves the heading offset uncertain by this much, which the filter's own sigma does not hold."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
     if local is not None and abs(local.offset_s) < NEAR_S and local.skew_is_possible:
         as_it_stands = fit_clock(wheels, fixes, 0.0, filters=local.filters, rounds=0)
         if as_it_stands is not None and not _fails_elsewhere(local, as_it_stands):
-            return MotionClock(local, fixes.middle_s, (_told(local, fixes),))
+            return MotionClock(local, fixes.middle_s, (_told(local, fixes, wheels),))
     fits = _fitted(wheels, fixes, lags)
     if not fits:
         return None
@@ -117,7 +119,7 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
     chosen, notices = (good[0], []) if len(good) == 1 else _one_of(good, fixes, span_s, overlap)
     half_s = 0.5 * float(np.ptp(fixes.t_s))
     if not overlap or _mismatch_is_clear(chosen, half_s):
-        notices.insert(0, _told(chosen, fixes))
+        notices.insert(0, _told(chosen, fixes, wheels))
         return MotionClock(chosen, fixes.middle_s, tuple(notices))
     return None
 
@@ -244,16 +246,23 @@ def _disagree_in_part(found: ClockFit, fixes: Fixes) -> Notice:
     return Notice("gnss", what, int(fixes.t_s.size), "", "warning", doubt)
 
 
-def _told(fit: ClockFit, fixes: Fixes) -> Notice:
+def _told(fit: ClockFit, fixes: Fixes, wheels: WheelPath) -> Notice:
     """What was found; a doubt where it is not known well."""
     what = (
         f"fixes put on the wheels' clock by their motion: offset {fit.offset_s:+.3f} ± {fit.sigma_offset_s:.3f} s, "
         f"skew {1e6 * fit.skew:+.0f} ± {1e6 * fit.sigma_skew:.0f} ppm; a latency of the receiver is part of the offset"
     )
+    turned = float(wheels.yaw_rad[-1] - wheels.yaw_rad[0]) / float(np.ptp(wheels.t_s))
+    heading = abs(np.degrees(turned)) * fit.sigma_offset_s
     doubt = ""
     if fit.sigma_offset_s > KNOWN_S:
         doubt = (
             f"the offset between the clocks is known to ± {fit.sigma_offset_s:.2f} s only: "
             "log receive times, or stop now and then"
+        )
+    elif heading > KNOWN_HEADING_DEG:
+        doubt = (
+            f"the offset between the clocks is known to ± {fit.sigma_offset_s:.3f} s, and while turning one way that is "
+            f"± {heading:.2f}° of the heading offset: log receive times, or turn both ways and stop now and then"
         )
     return Notice("gnss", what, int(fixes.t_s.size), "", "warning", doubt)

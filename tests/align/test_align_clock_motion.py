@@ -78,6 +78,13 @@ def test_at_one_speed_the_sigma_says_what_the_drive_shows(drive, path):
     assert abs(clock.offset_s - true_s) < 4.0 * clock.sigma_offset_s
 
 
+@pytest.mark.parametrize(("path", "doubtful"), [("circle", True), ("rectangle", False), ("general", False)])
+def test_turning_one_way_leaves_a_doubt_about_the_heading(drive, path, doubtful):
+    run, _ = off(drive(path), 97.0)
+    doubts = [notice.doubt for notice in align(run).notices if notice.doubt]
+    assert any("of the heading offset" in doubt for doubt in doubts) == doubtful
+
+
 def test_sigmas_are_honest(drive):
     scores = []
     for seed in range(1, 9):
