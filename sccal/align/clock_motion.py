@@ -262,7 +262,7 @@ def _told(fit: ClockFit, fixes: Fixes, wheels: WheelPath) -> Notice:
         )
     elif heading > KNOWN_HEADING_DEG:
         doubt = (
-            f"the offset between the clocks is known to ± {fit.sigma_offset_s:.3f} s, and while turning one way that is "
+            f"the offset between the clocks is known to ± {fit.sigma_offset_s:.3f} s, and turning one way that is "
             f"± {heading:.2f}° of the heading offset: log receive times, or turn both ways and stop now and then"
         )
     return Notice("gnss", what, int(fixes.t_s.size), "", "warning", doubt)
