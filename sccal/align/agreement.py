@@ -115,7 +115,7 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     sigma = _spread(by_fixes - moved, left, fix_t_s, t_s, chunks)
     sigma = np.hypot(sigma, SCALE_ERROR * np.maximum(moved, by_fixes))
     frozen = _repeated(fixes, path, fix_t_s, t_s)
-    shifted = [by_wheels(lag_s) for lag_s in (*-LAGS_S, *LAGS_S)]
+    shifted = np.array([by_wheels(lag_s) for lag_s in (*-LAGS_S, *LAGS_S)])
     few_apart, few_stuck = (max(2, round(seconds / window_s)) for seconds in (APART_S, STUCK_S))
     apart: list[float] = []
     judged = 0
@@ -129,10 +129,8 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
         bad = np.abs(off) > CLEAR_SIGMAS
         one_stands = bad & (np.minimum(by_fixes, moved)[part] < STANDING_SHARE * np.maximum(by_fixes, moved)[part])
         cost = float(np.minimum(off**2, CLEAR_SIGMAS**2).sum())
-        best = min(
-            float(np.minimum(((by_fixes[part] - other[part]) / sigma[part]) ** 2, CLEAR_SIGMAS**2).sum())
-            for other in shifted
-        )
+        others = (by_fixes[part] - shifted[:, part]) / sigma[part]
+        best = float(np.minimum(others**2, CLEAR_SIGMAS**2).sum(axis=1).min())
         lagging = bad.sum() >= few_apart and cost > BETTER * best + CLEAR_SIGMAS**2
         stuck = _longest(one_stands) >= few_stuck or frozen[part].any()
         if lagging or stuck or np.mean(bad) > MOSTLY:
@@ -163,9 +161,11 @@ def _antenna_path(aligned: Aligned, fixes: Complexes, t_s: Floats) -> tuple[Floa
     weight = np.ones(first.size)
     small = 1e-6 * np.eye(2)
     for _ in range(5):
-        normal = (x.conj().T * weight) @ x
-        solution = np.linalg.solve(normal + small * max(float(np.trace(normal).real), 1e-9), (x.conj().T * weight) @ y)
-        off = np.abs(y - x @ solution)
+        weighted = weight[:, None] * x
+        normal = np.array([[np.vdot(a, b) for b in x.T] for a in weighted.T])
+        right = np.array([np.vdot(a, y) for a in weighted.T])
+        solution = np.linalg.solve(normal + small * max(float(np.trace(normal).real), 1e-9), right)
+        off = np.abs(y - x[:, 0] * solution[0] - x[:, 1] * solution[1])
         weight = 1.0 / np.maximum(off / max(float(np.median(off)), 1e-3), 1.0)
     if not SCALES[0] < abs(solution[0]) < SCALES[1] or abs(solution[1]) > LONGEST_ARM * aligned.vehicle.track_m:
         solution = np.array([1.0, 0.0], dtype=complex)
@@ -215,9 +215,9 @@ def _repeated(fixes: Complexes, path: Complexes, fix_t_s: Floats, t_s: Floats) -
     frozen = np.zeros(t_s.size - 1, dtype=bool)
     starts = np.concatenate(([0], np.flatnonzero(np.diff(fixes) != 0) + 1))
     ends = np.append(starts[1:], fixes.size) - 1
-    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        long = fix_t_s[end] - fix_t_s[start] >= FROZEN_S
-        if long and float(np.abs(np.diff(path[start : end + 1])).sum()) > FROZEN_M:
+    for row in np.flatnonzero(fix_t_s[ends] - fix_t_s[starts] >= FROZEN_S):
+        start, end = starts[row], ends[row]
+        if float(np.abs(np.diff(path[start : end + 1])).sum()) > FROZEN_M:
             frozen |= (t_s[:-1] >= fix_t_s[start]) & (t_s[:-1] < fix_t_s[end])
     return frozen
 
