@@ -2,7 +2,9 @@
 
 A stream that lags by seconds, or repeats one value, is absorbed by noise and parameters and gives wrong results that
 look consistent. Here each pair is compared directly: turning of yaw against turning of the wheels, second by second,
-and displacement of the fixes against the path that the wheels draw along the yaw.
+and how far the fixes move in two seconds against how far the wheels do. Noise is not disagreement: how far both differ
+is measured by what the log itself shows, single outliers are left out, and a stretch counts only where one stream
+stands while the other moves, or where a shift in time would bring them together.
 """
 
 from __future__ import annotations
@@ -11,8 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sccal.align.path import laid_out
 from sccal.align.signs import slope_through_origin, wheel_turn
-from sccal.arrays import Floats
+from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.streams import Notice
 
@@ -24,8 +27,26 @@ CLEAR_TURN_RAD = np.radians(4.0)
 ENOUGH_TURN_RAD = np.radians(120.0)
 TOGETHER = 0.6
 MOVE_WINDOW_S = 2.0
-CLEAR_SIGMAS = 6.0
+CELL_S = 1.0
+PATH_RATE_HZ = 20.0
+CLEAR_SIGMAS = 5.0
+SCALE_ERROR = 0.08
+"""Of a displacement: radii, slip and a heading's error may be off by so much in a window."""
+LEAST_SPREAD_M = 0.02
 FEWEST_MOVES = 10
+APART_S = 6.0
+STUCK_S = 10.0
+LONGEST_WINDOW_S = 8.0
+SCALES = (0.5, 2.0)
+LONGEST_ARM = 3.0
+"""In track widths."""
+STANDING_SHARE = 0.2
+MOSTLY = 0.5
+BETTER = 3.0
+"""Another lag must bring the cost down by this factor to say that a stream is shifted."""
+LAGS_S = np.arange(1.0, 15.1, 0.5)
+FROZEN_S = 10.0
+FROZEN_M = 2.0
 
 
 def check_agreement(aligned: Aligned) -> list[Notice]:
@@ -33,7 +54,7 @@ def check_agreement(aligned: Aligned) -> list[Notice]:
     return [*_yaw_against_wheels(aligned), *_fixes_against_wheels(aligned)]
 
 
-def _chunks(t_s: Floats) -> list[np.ndarray]:
+def _chunks(t_s: Floats) -> list[Ints]:
     """Rows of each stretch of about CHUNK_S."""
     if t_s.size == 0:
         return []
@@ -73,24 +94,46 @@ def _yaw_against_wheels(aligned: Aligned) -> list[Notice]:
 
 def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     rows = np.flatnonzero(aligned.fix_leading)
-    t_s = np.arange(aligned.fix_t_s[rows[0]], aligned.fix_t_s[rows[-1]], MOVE_WINDOW_S)
-    if t_s.size < FEWEST_MOVES:
-        return []
-    by_wheels = np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.path_along_yaw)))
+    fix_t_s = aligned.fix_t_s[rows]
     fixes = aligned.fix_east_m[rows] + 1j * aligned.fix_north_m[rows]
-    by_fixes = np.abs(np.diff(np.interp(t_s, aligned.fix_t_s[rows], fixes)))
-    watched = np.diff(np.interp(t_s, aligned.fix_t_s[rows], np.arange(rows.size))) > 0.5
-    sigma = float(np.median(np.sqrt(aligned.fix_var_east_m2[rows] + aligned.fix_var_north_m2[rows])))
+    if rows.size < FEWEST_MOVES or np.ptp(fix_t_s) < FEWEST_MOVES * MOVE_WINDOW_S:
+        return []
+    wheel_t_s, antenna = _antenna_path(aligned, fixes, fix_t_s)
+    path = np.interp(fix_t_s, wheel_t_s, antenna)
+    left = fixes - path
+    window_s = _window_s(antenna, wheel_t_s, left, fix_t_s)
+    t_s = np.arange(fix_t_s[0], fix_t_s[-1], window_s)
+
+    def by_wheels(lag_s: float) -> Floats:
+        return np.asarray(np.abs(np.diff(np.interp(t_s + lag_s, wheel_t_s, antenna))))
+
+    moved = by_wheels(0.0)
+    by_fixes = np.abs(np.diff(np.interp(t_s, wheel_t_s, antenna) + _settled(left, fix_t_s, t_s)))
+    watched = np.diff(np.interp(t_s, fix_t_s, np.arange(rows.size))) > 0.5
+    chunks = [part[watched[part]] for part in _chunks(t_s[:-1])]
+    chunks = [part for part in chunks if part.size * window_s > 0.5 * CHUNK_S]
+    sigma = _spread(by_fixes - moved, left, fix_t_s, t_s, chunks)
+    sigma = np.hypot(sigma, SCALE_ERROR * np.maximum(moved, by_fixes))
+    frozen = _repeated(fixes, path, fix_t_s, t_s)
+    shifted = np.array([by_wheels(lag_s) for lag_s in (*-LAGS_S, *LAGS_S)])
+    few_apart, few_stuck = (max(2, round(seconds / window_s)) for seconds in (APART_S, STUCK_S))
     apart: list[float] = []
     judged = 0
-    for part in _chunks(t_s[:-1]):
-        part = part[watched[part]]
-        if part.size < FEWEST_MOVES or np.std(by_wheels[part]) < max(
-            CLEAR_SIGMAS * sigma, 0.1 * np.mean(by_wheels[part])
-        ):
+    for part in chunks:
+        if (np.maximum(moved, by_fixes)[part] > CLEAR_SIGMAS * sigma[part]).sum() < few_apart and not frozen[
+            part
+        ].any():
             continue
         judged += 1
-        if np.std(by_fixes[part]) == 0 or np.corrcoef(by_wheels[part], by_fixes[part])[0, 1] < TOGETHER:
+        off = (by_fixes[part] - moved[part]) / sigma[part]
+        bad = np.abs(off) > CLEAR_SIGMAS
+        one_stands = bad & (np.minimum(by_fixes, moved)[part] < STANDING_SHARE * np.maximum(by_fixes, moved)[part])
+        cost = float(np.minimum(off**2, CLEAR_SIGMAS**2).sum())
+        others = (by_fixes[part] - shifted[:, part]) / sigma[part]
+        best = float(np.minimum(others**2, CLEAR_SIGMAS**2).sum(axis=1).min())
+        lagging = bad.sum() >= few_apart and cost > BETTER * best + CLEAR_SIGMAS**2
+        stuck = _longest(one_stands) >= few_stuck or frozen[part].any()
+        if lagging or stuck or np.mean(bad) > MOSTLY:
             apart.append(float(t_s[part[0]]))
     if not apart:
         return []
@@ -98,5 +141,88 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
         f"stretches of {CHUNK_S:.0f} s in which fixes and wheels do not speed up and slow down together: one of the "
         "streams is shifted in time, or frozen"
     )
-    doubt = f"fixes and wheels do not move together in {len(apart)} of {judged} minutes with changes of speed"
+    doubt = f"fixes and wheels do not move together in {len(apart)} of {judged} minutes with motion"
     return [Notice("gnss", what, len(apart), f"t = {apart[0]:.0f} s", "warning", doubt)]
+
+
+def _antenna_path(aligned: Aligned, fixes: Complexes, t_s: Floats) -> tuple[Floats, Complexes]:
+    """Where wheels and yaw take the antenna, times (n,) and places (n,), turned and scaled as the fixes want it.
+
+    From displacements over MOVE_WINDOW_S, robustly, so that neither drift nor a bad stretch matters.
+    """
+    every = max(1, round(1.0 / (PATH_RATE_HZ * max(float(np.median(np.diff(aligned.wheel_t_s))), 1e-6))))
+    wheel_t_s = aligned.wheel_t_s[::every]
+    yaw = np.interp(wheel_t_s, aligned.heading_t_s, aligned.yaw_rad)
+    columns = (laid_out(aligned.travel_m[::every], yaw), np.exp(1j * yaw))
+    at_fixes = np.column_stack([np.interp(t_s, wheel_t_s, column) for column in columns])
+    later = np.searchsorted(t_s, t_s + MOVE_WINDOW_S)
+    first = np.flatnonzero(later < t_s.size)
+    x, y = at_fixes[later[first]] - at_fixes[first], fixes[later[first]] - fixes[first]
+    weight = np.ones(first.size)
+    small = 1e-6 * np.eye(2)
+    for _ in range(5):
+        weighted = weight[:, None] * x
+        normal = np.array([[np.vdot(a, b) for b in x.T] for a in weighted.T])
+        right = np.array([np.vdot(a, y) for a in weighted.T])
+        solution = np.linalg.solve(normal + small * max(float(np.trace(normal).real), 1e-9), right)
+        off = np.abs(y - x[:, 0] * solution[0] - x[:, 1] * solution[1])
+        weight = 1.0 / np.maximum(off / max(float(np.median(off)), 1e-3), 1.0)
+    if not SCALES[0] < abs(solution[0]) < SCALES[1] or abs(solution[1]) > LONGEST_ARM * aligned.vehicle.track_m:
+        solution = np.array([1.0, 0.0], dtype=complex)
+    return wheel_t_s, columns[0] * solution[0] + columns[1] * solution[1]
+
+
+def _window_s(antenna: Complexes, wheel_t_s: Floats, left: Complexes, fix_t_s: Floats) -> float:
+    """Long enough that a displacement stands out from the noise of the fixes."""
+    speed = float(np.abs(np.diff(antenna)).sum()) / max(float(np.ptp(wheel_t_s)), 1e-9)
+    per_cell = max(1.0, left.size * CELL_S / max(float(np.ptp(fix_t_s)), CELL_S))
+    noise = float(np.median(np.abs(np.diff(left)))) * np.sqrt(1.6 / per_cell)
+    return float(np.clip(2.0 * CLEAR_SIGMAS * noise / max(speed, 1e-3), MOVE_WINDOW_S, LONGEST_WINDOW_S))
+
+
+def _settled(left: Complexes, fix_t_s: Floats, t_s: Floats) -> Complexes:
+    """Medians of what the path leaves of the fixes, over CELL_S around each time: single outliers are gone."""
+    number = np.floor((fix_t_s - fix_t_s[0]) / CELL_S).astype(np.int64)
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(number) > 0)))
+    count = np.diff(np.append(starts, fix_t_s.size))
+    lower, upper = starts + (count - 1) // 2, starts + count // 2
+
+    def medians(values: Floats) -> Floats:
+        ordered = values[np.lexsort((values, number))]
+        return np.asarray(0.5 * (ordered[lower] + ordered[upper]))
+
+    at = np.add.reduceat(fix_t_s, starts) / count
+    return np.asarray(np.interp(t_s, at, medians(left.real) + 1j * medians(left.imag)))
+
+
+def _spread(off_m: Floats, left: Complexes, fix_t_s: Floats, t_s: Floats, chunks: list[Ints]) -> Floats:
+    """Noise of the difference of the two displacements in each window (n,): the run's usual one, or the chunk's."""
+    usual = [float(np.quantile(np.abs(off_m[part]), 0.68)) for part in chunks]
+    spread = np.full(off_m.size, max(float(np.quantile(usual, 0.25)) if usual else 0.0, LEAST_SPREAD_M))
+    steps = np.abs(np.diff(left))
+    for part in chunks:
+        inside = slice(*np.searchsorted(fix_t_s, (t_s[part[0]], t_s[part[-1]])))
+        some = steps[inside]
+        if some.size:
+            per_cell = max(1.0, some.size * CELL_S / CHUNK_S)
+            of_steps = 1.4 * float(np.quantile(some, 0.3))
+            spread[part] = np.maximum(spread[part], of_steps * np.sqrt(1.6 / per_cell))
+    return spread
+
+
+def _repeated(fixes: Complexes, path: Complexes, fix_t_s: Floats, t_s: Floats) -> Bools:
+    """Windows within a stretch in which the very same position comes again and again while the wheels go on."""
+    frozen = np.zeros(t_s.size - 1, dtype=bool)
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(fixes) != 0) + 1))
+    ends = np.append(starts[1:], fixes.size) - 1
+    for row in np.flatnonzero(fix_t_s[ends] - fix_t_s[starts] >= FROZEN_S):
+        start, end = starts[row], ends[row]
+        if float(np.abs(np.diff(path[start : end + 1])).sum()) > FROZEN_M:
+            frozen |= (t_s[:-1] >= fix_t_s[start]) & (t_s[:-1] < fix_t_s[end])
+    return frozen
+
+
+def _longest(flags: Bools) -> int:
+    """Length of the longest stretch of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return int((edges[1::2] - edges[::2]).max(initial=0))

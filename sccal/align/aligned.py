@@ -9,6 +9,8 @@ import numpy as np
 
 from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m, usable
 from sccal.align.agreement import check_agreement
+from sccal.align.clock_fit import Fixes, wheel_path
+from sccal.align.clock_motion import MotionClock, clock_by_motion
 from sccal.align.clocks import Clock, require_overlap
 from sccal.align.path import laid_out
 from sccal.align.reference import (
@@ -27,6 +29,8 @@ from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, 
 from sccal.logs.windows import Window, windows_on_clock, within
 
 MIN_MEASUREMENTS = 10
+WHEEL_RATE_HZ = 20.0
+"""As fine as the path need be for comparing clocks."""
 
 
 @dataclass(frozen=True)
@@ -120,9 +124,13 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     wheels = _from_first_heading(wheels, heading)
     span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
 
-    t_s, timed, clock, before_t_s = on_host_clock(fixes, run.reference, span)
+    t_s, timed, clock, before_t_s = on_host_clock(fixes, run.reference, span, notices)
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
+    moved = _clocks_by_motion(run, heading, wheels, t_s, timed)
+    if moved is not None:
+        notices += moved.notices
+        t_s, before_t_s, clock = moved.moved(t_s), moved.moved(before_t_s), moved.after(clock)
     require_overlap(t_s[timed], span, clock, "the fixes")
 
     good = timed & usable(fixes.quality)
@@ -194,6 +202,34 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
+
+
+def _clocks_by_motion(
+    run: Run, heading: HeadingStream, wheels: WheelStream, t_s: Floats, timed: Bools
+) -> MotionClock | None:
+    """How the fixes' times have to be moved, where the motion shows that they are clearly off the wheels' clock.
+
+    Where the heading came with the fixes it is on their clock, not on the wheels': there is no path to compare them by.
+    """
+    fixes, vehicle = run.fixes, run.vehicle
+    rows = in_order(t_s, timed & usable(fixes.quality))
+    alone = heading.utc_s is not None and not np.isfinite(fixes.host_t_s).any()
+    if rows.size < MIN_MEASUREMENTS or alone:
+        return None
+    placed = in_plane(fixes, t_s, rows, TangentPlane(float(fixes.lat_deg[rows[0]]), float(fixes.lon_deg[rows[0]]), 0.0))
+    leading = leading_fixes(placed)
+    sigma = float(np.sqrt(np.median((placed.var_east_m2 + placed.var_north_m2)[leading]) / 2.0))
+    every = max(1, round(WHEEL_RATE_HZ**-1 / max(float(np.median(np.diff(wheels.t_s))), 1e-6)))
+    covered = (wheels.t_s >= heading.t_s[0]) & (wheels.t_s <= heading.t_s[-1])
+    index = np.flatnonzero(covered)[::every]
+    if index.size < MIN_MEASUREMENTS:
+        return None
+    yaw = np.unwrap(yaw_to_enu(heading.yaw_rad, heading.convention or vehicle.convention))
+    travel = vehicle.wheel_radius_m * 0.5 * (wheels.right_rad[index] + wheels.left_rad[index])
+    path = wheel_path(wheels.t_s[index], travel, np.interp(wheels.t_s[index], heading.t_s, yaw), vehicle.track_m)
+    span = (float(run.wheels.t_s[0]), float(run.wheels.t_s[-1]))
+    places = (placed.east_m + 1j * placed.north_m)[leading]
+    return clock_by_motion(path, Fixes(placed.t_s[leading], places, sigma), span)
 
 
 def _further_columns(*streams: tuple[str, Floats, Mapping[str, Floats]]) -> dict[str, Series]:

@@ -13,61 +13,72 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
+from sccal.align.receive_times import Delay, fit_delay
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
-from sccal.logs.streams import FixStream
+from sccal.logs.streams import FixStream, Notice
 
 DAY_S = 86400.0
-SEGMENTS_S = (120.0, 60.0, 30.0, 15.0, 8.0)
-JITTER_CORRELATION_S = 0.5
-HUBER_ROUNDS = 8
-EARLIEST = 0.02
-HURRY_SPREADS = 6.0
-"""Lines arrive late, never early: the mapping is laid through the earliest of them, which hurried most."""
-CORNER_COST = 1.5
-"""Times what the criterion asks: the corners' places are chosen too, if only from a few grids."""
+ERA_S = 1024 * 7 * DAY_S
+"""Receivers count weeks modulo 1024; after a rollover their dates may be this much in the past."""
 
 
 @dataclass(frozen=True)
 class Clock:
     """How the fixes' times were put on the logging computer's clock."""
 
-    source: Literal["host", "utc", "utc_mapped"]
+    source: Literal["host", "utc", "utc_mapped", "motion"]
     """host: receive times as logged (gnss.csv); utc: the logging clock is Unix time; utc_mapped: the receiver's epochs
-    mapped onto the logging clock through the receive times."""
+    mapped onto the logging clock through the receive times; motion: any of these, and then moved to where fixes and
+    wheels move together."""
     offset_s: float
-    """Logging clock minus UTC in the middle of the run (0 where source is host)."""
+    """Logging clock minus UTC at the median time of the fixes. For receive times alone, and unless moved: 0; if moved:
+    the wheels' clock minus the one that stamped the fixes."""
     skew_ppm: float
     """Mean rate of the logging clock against UTC, minus one."""
     jitter_s: float
     """Robust spread (1.4826 × median absolute deviation) of the receive times around the mapping."""
     knots: int
     """Corners of the mapping; 2 is a straight line, more mean that the logging clock was being steered."""
+    sigma_offset_s: float = 0.0
+    """Standard deviations of offset and skew; 0 where they are not estimated but taken as logged."""
+    sigma_skew_ppm: float = 0.0
 
 
-def fixes_on_host_clock(fixes: FixStream, span_s: tuple[float, float]) -> tuple[Floats, Bools, Clock]:
+def fixes_on_host_clock(
+    fixes: FixStream, span_s: tuple[float, float], notices: list[Notice] | None = None
+) -> tuple[Floats, Bools, Clock]:
     """Times of the fixes on the logging clock (n,), which of them have one (n,), and how that was done.
 
-    span_s is the first and last time of the wheel stream, for logs whose clocks must already agree.
-    Raises DataError where the clocks cannot be brought together.
+    span_s is the first and last time of the wheel stream, for logs whose clocks must already agree. What was met on the
+    way is added to notices.
     """
+    told = [] if notices is None else notices
     host, utc = fixes.host_t_s, fixes.utc_s
     both = np.isfinite(host) & np.isfinite(utc)
     if both.sum() >= 2 and np.ptp(utc[both]) > 0:
         centre = float(np.median(utc[both]))
-        delay = host - utc
-        mapping_t, mapping_v, jitter = _fit_delay(utc[both] - centre, delay[both])
-        t_s = np.where(np.isfinite(utc), utc + np.interp(utc - centre, mapping_t, mapping_v), host)
-        span = float(mapping_t[-1] - mapping_t[0])
-        skew = float(mapping_v[-1] - mapping_v[0]) / span if span > 0 else 0.0
-        clock = Clock("utc_mapped", float(np.interp(0.0, mapping_t, mapping_v)), 1e6 * skew, jitter, mapping_t.size)
+        found = fit_delay(utc[both] - centre, (host - utc)[both])
+        t_s = np.where(np.isfinite(utc), utc + found.at(utc - centre), host)
+        offset = float(found.at(np.zeros(1))[0])
+        _tell_delay(found, centre, offset, fixes.utc_has_date, int(both.sum()), told)
+        clock = Clock(
+            "utc_mapped",
+            offset,
+            1e6 * found.skew,
+            found.jitter_s,
+            found.knot_s.size,
+            found.sigma_offset_s,
+            1e6 * found.sigma_skew,
+        )
         return t_s, np.isfinite(t_s), clock
     if np.isfinite(host).any():
         return host, np.isfinite(host), Clock("host", 0.0, 0.0, 0.0, 2)
-    t_s = utc if fixes.utc_has_date else _on_the_day_of(utc, span_s)
-    return t_s, np.isfinite(t_s), Clock("utc", 0.0, 0.0, 0.0, 2)
+    t_s = _in_the_era_of(utc, span_s, told) if fixes.utc_has_date else _on_the_day_of(utc, span_s)
+    timed = np.isfinite(t_s)
+    shift = float((t_s - utc)[timed][0]) if fixes.utc_has_date and timed.any() else 0.0
+    return t_s, timed, Clock("utc", shift, 0.0, 0.0, 2)
 
 
 def require_overlap(t_s: Floats, span_s: tuple[float, float], clock: Clock, what: str) -> None:
@@ -76,7 +87,8 @@ def require_overlap(t_s: Floats, span_s: tuple[float, float], clock: Clock, what
         return
     seen = f"{t_s[0]:.3f} … {t_s[-1]:.3f} s" if t_s.size else "no usable rows"
     advice = (
-        "without receive times before the NMEA lines, t in encoder.csv and ahrs.csv must be Unix time (UTC)"
+        "without receive times before the NMEA lines, t in encoder.csv and ahrs.csv must be Unix time (UTC), "
+        "and the motion shows no other offset between the clocks"
         if clock.source == "utc"
         else "all streams must share the logging computer's clock"
     )
@@ -90,51 +102,34 @@ def _on_the_day_of(time_of_day_s: Floats, span_s: tuple[float, float]) -> Floats
     return np.asarray(time_of_day_s + days * DAY_S)
 
 
-def _fit_delay(utc_s: Floats, delay_s: Floats) -> tuple[Floats, Floats, float]:
-    """Continuous piecewise linear fit of the delay: its corners' times and values, and the jitter around it."""
-    reference = float(np.median(delay_s))
-    values = delay_s - reference
-    span = float(np.ptp(utc_s))
-    rate = utc_s.size / max(span, 1e-9)
-    independent = utc_s.size / max(1.0, rate * JITTER_CORRELATION_S)
-    best: tuple[float, Floats, Floats, float, float] | None = None
-    for segment_s in (np.inf, *SEGMENTS_S):
-        count = 2 if np.isinf(segment_s) else round(span / segment_s) + 1
-        if count < 2 or (best is not None and count <= best[1].size) or count > independent / 4 + 2:
-            continue
-        knots = np.linspace(utc_s.min(), utc_s.max(), count)
-        fitted, residual = _robust_hat_fit(utc_s, values, knots)
-        spread = max(1.4826 * float(np.median(np.abs(residual))), 1e-5)
-        laplace = max(float(np.mean(np.abs(residual))), 1e-5)
-        score = 2.0 * independent * np.log(laplace) + CORNER_COST * count * np.log(max(independent, 2.0))
-        if best is None or score < best[0]:
-            best = (score, knots, fitted, spread, _earliest(residual, spread))
-    assert best is not None
-    return best[1], best[2] + reference + best[4], best[3]
+def _in_the_era_of(utc_s: Floats, span_s: tuple[float, float], notices: list[Notice]) -> Floats:
+    """Epochs whose dates are whole GPS eras off the wheels' Unix time put right; others as they are."""
+    if not np.isfinite(utc_s).any():
+        return utc_s
+    away = 0.5 * (span_s[0] + span_s[1]) - float(np.nanmedian(utc_s))
+    eras = round(away / ERA_S)
+    if eras == 0 or abs(away - eras * ERA_S) > DAY_S:
+        return utc_s
+    notices.append(_era_notice(eras, int(utc_s.size)))
+    return np.asarray(utc_s + eras * ERA_S)
 
 
-def _earliest(residual: Floats, spread: float) -> float:
-    """How much before the middle the earliest lines come; stamps of a clock that stepped are no lines in a hurry."""
-    return float(np.quantile(residual[np.abs(residual) <= HURRY_SPREADS * spread], EARLIEST))
+def _era_notice(eras: int, count: int) -> Notice:
+    when = "in the past" if eras > 0 else "in the future"
+    what = f"fixes dated {1024 * abs(eras)} weeks {when} by the receiver (GPS week rollover), put right"
+    return Notice("gnss", what, count, "", "warning")
 
 
-def _robust_hat_fit(t_s: Floats, values: Floats, knots: Floats) -> tuple[Floats, Floats]:
-    """Least absolute deviations by reweighting, on hat functions at the knots; (values at knots, residuals)."""
-    left = np.clip(np.searchsorted(knots, t_s, side="right") - 1, 0, knots.size - 2)
-    upper = (t_s - knots[left]) / (knots[left + 1] - knots[left])
-    lower = 1.0 - upper
-    weight = np.ones(t_s.size)
-    fitted = np.full(knots.size, float(np.median(values)))
-    residual = values - fitted[0]
-    for _ in range(HUBER_ROUNDS):
-        diagonal = np.bincount(left, weight * lower * lower, knots.size)
-        diagonal += np.bincount(left + 1, weight * upper * upper, knots.size)
-        beside = np.bincount(left, weight * lower * upper, knots.size)[:-1]
-        right_side = np.bincount(left, weight * lower * values, knots.size)
-        right_side += np.bincount(left + 1, weight * upper * values, knots.size)
-        banded = np.array([np.concatenate(([0.0], beside)), diagonal + 1e-9 * diagonal.max()])
-        fitted = solveh_banded(banded, right_side)
-        residual = values - (lower * fitted[left] + upper * fitted[left + 1])
-        scale = max(1.4826 * float(np.median(np.abs(residual))), 1e-6)
-        weight = 1.0 / np.maximum(np.abs(residual), 0.5 * scale)
-    return fitted, residual
+def _tell_delay(
+    found: Delay, centre_s: float, offset_s: float, has_date: bool, count: int, notices: list[Notice]
+) -> None:
+    eras = round(offset_s / ERA_S)
+    if has_date and eras and abs(offset_s - eras * ERA_S) <= DAY_S:
+        notices.append(_era_notice(eras, count))
+    if found.late:
+        notices.append(Notice("gnss", "receive times not used: lines kept back in a buffer", found.late))
+    if found.step_s.size:
+        sizes = ", ".join(f"{-size:+.2f} s" for size in found.step_s[:5])
+        first = f"UTC {np.datetime64(round(1e3 * (centre_s + found.step_at_s[0])), 'ms')}"
+        what = f"steps of the receiver's time against the logging clock mended ({sizes}): leap seconds, or a clock set"
+        notices.append(Notice("gnss", what, int(found.step_s.size), first, "warning"))

@@ -15,7 +15,7 @@ from sccal.align.accuracy import fix_covariance, usable
 from sccal.align.clocks import Clock, fixes_on_host_clock
 from sccal.arrays import Bools, Floats, Ints
 from sccal.geodesy import TangentPlane
-from sccal.logs.streams import FixStream, Reference
+from sccal.logs.streams import FixStream, Notice, Reference
 
 
 @dataclass(frozen=True)
@@ -59,18 +59,18 @@ def in_order(t_s: Floats, good: Bools) -> Ints:
 
 
 def on_host_clock(
-    fixes: FixStream, reference: Reference | None, span_s: tuple[float, float]
+    fixes: FixStream, reference: Reference | None, span_s: tuple[float, float], notices: list[Notice] | None = None
 ) -> tuple[Floats, Bools, Clock, Floats]:
     """As fixes_on_host_clock, and the times of the reference's fixes (m,), NaN where they have none.
 
     Lines whose positions were taken out keep their share in the map: it is the map of the log as it was.
     """
     if reference is None:
-        return (*fixes_on_host_clock(fixes, span_s), np.zeros(0))
+        return (*fixes_on_host_clock(fixes, span_s, notices), np.zeros(0))
     there = fixes.lat_deg.size
     whole = joined(fixes, reference.fixes.take(np.flatnonzero(reference.lost)))
     order = np.argsort(np.where(np.isfinite(whole.utc_s), whole.utc_s, whole.host_t_s), kind="stable")
-    t_ordered, timed_ordered, clock = fixes_on_host_clock(whole.take(order), span_s)
+    t_ordered, timed_ordered, clock = fixes_on_host_clock(whole.take(order), span_s, notices)
     t_s, timed = np.empty(order.size), np.zeros(order.size, dtype=np.bool_)
     t_s[order], timed[order] = t_ordered, timed_ordered
     back = np.full(reference.lost.size, np.nan)

@@ -197,7 +197,9 @@ def _clock(clock: Clock) -> Json:
     return {
         "source": clock.source,
         "offset_s": clock.offset_s,
+        "sigma_offset_s": clock.sigma_offset_s,
         "skew_ppm": clock.skew_ppm,
+        "sigma_skew_ppm": clock.sigma_skew_ppm,
         "jitter_s": clock.jitter_s,
         "knots": clock.knots,
     }

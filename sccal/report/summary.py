@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from sccal.calibration.result import AgainstReference, Clock, Drive, Fit, Noise, Outage, OutageWindow, Unseen
 from sccal.logs.streams import Notice
-from sccal.report.numbers import MISSING, duration, one_line, plain, short
+from sccal.report.numbers import MISSING, duration, one_line, plain, short, value_and_sigma
 
 LOSSES_SHOWN = 5
 
@@ -105,10 +105,21 @@ def clock_line(clock: Clock) -> str:
     """How the fixes came onto the logging clock."""
     if clock.source == "host":
         return "fixes at their receive times, as logged"
+    offset, skew = _with_sigma(clock.offset_s, clock.sigma_offset_s), _with_sigma(clock.skew_ppm, clock.sigma_skew_ppm)
+    if clock.source == "motion":
+        what = "fixes put on the wheels' clock by their motion"
+        return f"{what}: {offset} s, skew {skew} ppm (a latency of the receiver included)"
     way = "the logging clock is Unix time" if clock.source == "utc" else "receiver epochs mapped onto the logging clock"
     steered = f", steered ({clock.knots} knots)" if clock.knots > 2 else ""
     jitter = plain(1e3 * clock.jitter_s, 2) if math.isfinite(clock.jitter_s) else MISSING
-    return f"{way}: {_signed(clock.offset_s)} s, skew {_signed(clock.skew_ppm)} ppm, jitter {jitter} ms{steered}"
+    return f"{way}: {offset} s, skew {skew} ppm, jitter {jitter} ms{steered}"
+
+
+def _with_sigma(value: float, sigma: float) -> str:
+    if not sigma > 0.0:
+        return _signed(value)
+    text, error = value_and_sigma(value, sigma)
+    return f"{text if text.startswith('-') else '+' + text} ± {error}"
 
 
 def drive_line(drive: Drive) -> str:

@@ -66,3 +66,58 @@ def test_a_doubt_reaches_the_verdict(run):
     verdict = run_verdict(replace(calibration, notices=(odd,)))
     assert verdict.level == "doubtful"
     assert "the clock stepped back" in str(verdict)
+
+
+NOISES = (
+    (),
+    ("gnss.white_sigma_m=0.3",),
+    ("gnss.white_sigma_m=0.3", "gnss.quality=5"),
+    ("gnss.white_sigma_m=5", "gnss.quality=1"),
+    ("gnss.outlier_fraction=0.03", "gnss.outlier_largest_m=30"),
+    ("gnss.rate_hz=1", "gnss.outlier_fraction=0.02"),
+    ("gnss.antenna_forward_m=0.5", "gnss.antenna_left_m=0.4"),
+    ("ahrs.drift_sigma_deg=5",),
+)
+
+
+@pytest.mark.parametrize("path", ["general", "rows"])
+@pytest.mark.parametrize("settings", NOISES, ids=lambda settings: " ".join(settings) or "RTK")
+def test_noise_outliers_and_antennas_are_no_disagreement(tmp_path, path, settings):
+    for seed in (1, 2):
+        assert doubts(read(written(tmp_path / str(seed), *settings, path=path, duration_s=300, seed=seed))) == []
+
+
+@pytest.fixture(scope="module", params=[(), ("gnss.outlier_fraction=0.02",), ("gnss.rate_hz=1",)])
+def noisy(request, tmp_path_factory):
+    return read(written(tmp_path_factory.mktemp("noisy"), *request.param, duration_s=300, seed=6))
+
+
+@pytest.mark.parametrize("seconds", [3.0, -3.0])
+def test_fixes_that_are_off_by_seconds_in_half_of_the_run_are_told(noisy, seconds):
+    later = noisy.fixes.host_t_s > float(np.median(noisy.fixes.host_t_s))
+    by_s = np.where(later, seconds, 0.0)
+    fixes = replace(noisy.fixes, host_t_s=noisy.fixes.host_t_s + by_s, utc_s=noisy.fixes.utc_s + by_s)
+    aligned = align(replace(noisy, fixes=fixes))
+    assert aligned.clock.source == "utc_mapped"
+    assert any("fixes" in notice.doubt for notice in aligned.notices)
+
+
+def test_fixes_that_stand_still_for_a_minute_are_told(noisy):
+    begin_s = noisy.fixes.host_t_s[0] + 100.0
+    held = (noisy.fixes.host_t_s > begin_s) & (noisy.fixes.host_t_s < begin_s + 60.0)
+    first = np.flatnonzero(held)[0]
+    lat, lon = (np.where(held, v[first], v) for v in (noisy.fixes.lat_deg, noisy.fixes.lon_deg))
+    assert any(
+        "move together" in d for d in doubts(replace(noisy, fixes=replace(noisy.fixes, lat_deg=lat, lon_deg=lon)))
+    )
+
+
+def test_wheels_that_stand_still_for_a_minute_are_told(noisy):
+    t_s = noisy.wheels.t_s - noisy.wheels.t_s[0]
+    held = (t_s > 100.0) & (t_s < 160.0)
+    first = np.flatnonzero(held)[0]
+    left, right = (np.where(held, v[first], v) for v in (noisy.wheels.left_rad, noisy.wheels.right_rad))
+    assert any(
+        "move together" in d
+        for d in doubts(replace(noisy, wheels=replace(noisy.wheels, left_rad=left, right_rad=right)))
+    )

@@ -162,11 +162,12 @@ def test_headings_that_begin_when_all_is_over(run):
         align(replace(run, heading=late))
 
 
-def test_fixes_without_receive_times_need_unix_time(run):
+def test_fixes_without_receive_times_or_motion_need_unix_time(run):
     fixes = replace(run.fixes, host_t_s=np.full(run.fixes.utc_s.size, np.nan))
     align(replace(run, fixes=fixes))
+    still = replace(fixes, lat_deg=np.full_like(fixes.lat_deg, 37.5), lon_deg=np.full_like(fixes.lon_deg, 15.0))
     with pytest.raises(DataError, match=r"the fixes .* do not overlap: .* must be Unix time"):
-        align(from_zero(replace(run, fixes=fixes)))
+        align(from_zero(replace(run, fixes=still)))
 
 
 def test_fixes_without_any_time(run):

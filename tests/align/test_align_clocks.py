@@ -13,7 +13,7 @@ from scipy.stats import gamma
 from sccal.align import Clock
 from sccal.align.clocks import fixes_on_host_clock, require_overlap
 from sccal.errors import DataError
-from sccal.logs.streams import FixStream
+from sccal.logs.streams import FixStream, Notice
 
 START_UTC_S = 1717243200.0
 MEAN_DELAY_S = 0.02
@@ -172,3 +172,67 @@ def test_advice_of_no_overlap_depends_on_the_clock():
 @pytest.mark.parametrize("t_s", [[-5.0, 0.0], [90.0, 95.0], [-5.0, 95.0], [40.0, 41.0]])
 def test_spans_that_touch_overlap(t_s):
     require_overlap(np.array(t_s), (0.0, 90.0), Clock("host", 0.0, 0.0, 0.0, 2), "ahrs.csv")
+
+
+def in_bursts(host_t_s: np.ndarray, share: float, seed: int) -> np.ndarray:
+    """Receive times of a buffer that is flushed late: all lines of a second or two are stamped with the last one's."""
+    rng = np.random.default_rng(seed)
+    late = host_t_s.copy()
+    t_s = float(host_t_s[0])
+    while t_s < host_t_s[-1]:
+        long_s = rng.uniform(1.0, 2.0)
+        t_s += rng.exponential(long_s * (1.0 - share) / share)
+        inside = (host_t_s >= t_s) & (host_t_s < t_s + long_s)
+        if inside.any():
+            late[inside] = host_t_s[inside].max()
+        t_s += long_s
+    return late
+
+
+def jittered(seed: int, skew_ppm: float = 0.0) -> FixStream:
+    """Exponential jitter of 50 ms, and a tenth of the time lines come in bunches."""
+    utc_s = epochs()
+    ahead_s = 97.0 + 1e-6 * skew_ppm * (utc_s - float(np.median(utc_s)))
+    host_t_s = utc_s + ahead_s + np.random.default_rng(seed).exponential(0.05, utc_s.size)
+    return fixes(in_bursts(np.maximum.accumulate(host_t_s), 0.1, seed + 100), utc_s)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_in_bunches_do_not_bend_the_mapping(seed):
+    stream = jittered(seed, 200.0)
+    t_s, _, clock = fixes_on_host_clock(stream, SPAN_S)
+    middle_s = float(np.median(stream.utc_s))
+    assert clock.knots == 2
+    assert np.max(np.abs(t_s - stream.utc_s - 97.0 - 200e-6 * (stream.utc_s - middle_s))) < 0.008
+    assert clock.skew_ppm == pytest.approx(200.0, abs=25.0)
+
+
+def test_sigmas_of_the_mapping_are_honest():
+    clocks = [fixes_on_host_clock(jittered(seed), SPAN_S)[2] for seed in range(16)]
+    offsets = np.array([(clock.offset_s - 97.001) / clock.sigma_offset_s for clock in clocks])
+    skews = np.array([clock.skew_ppm / clock.sigma_skew_ppm for clock in clocks])
+    assert 0.1 < np.sqrt(np.mean(offsets**2)) < 1.5
+    assert 0.1 < np.sqrt(np.mean(skews**2)) < 1.5
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_even_mostly_bunched_lines_keep_their_mapping(share):
+    stream = received(epochs(), 0, ahead_s=97.0)
+    bunched = replace(stream, host_t_s=in_bursts(stream.host_t_s, share, 1))
+    t_s, _, _ = fixes_on_host_clock(bunched, SPAN_S)
+    assert np.max(np.abs(t_s - stream.utc_s - 97.0 - EARLIEST_S)) < 0.006
+
+
+@pytest.mark.parametrize("steps", [[(300.0, 2.0)], [(300.0, -3.0)], [(150.0, 18.0), (400.0, -1.0)]])
+@pytest.mark.parametrize("stream", [received(epochs(), 5, ahead_s=97.0), jittered(5)])
+def test_leap_seconds_in_the_middle_are_mended(steps, stream):
+    shown_s, right_s = stream.utc_s.copy(), stream.utc_s + 97.0
+    for after_s, seconds in steps:
+        shown_s[stream.utc_s - START_UTC_S >= after_s] += seconds
+    onward = shown_s > np.maximum.accumulate(np.concatenate(([-np.inf], shown_s[:-1])))
+    notices: list[Notice] = []
+    t_s, _, _ = fixes_on_host_clock(fixes(stream.host_t_s[onward], shown_s[onward]), SPAN_S, notices)
+    assert np.max(np.abs(t_s - right_s[onward])) < 0.025
+    (told,) = [notice for notice in notices if "mended" in notice.what]
+    assert told.count == len(steps)
+    assert f"{steps[0][1]:+.2f} s"[:3] in told.what
