@@ -22,7 +22,7 @@ from sccal.degrade.layouts import (
     Layout,
     layout_of,
 )
-from sccal.logs.sentences import Sentences
+from sccal.logs.sentences import Kind, Sentences
 
 _DAY_S = 86400.0
 _KEYS_PER_S = 1000
@@ -83,12 +83,10 @@ class Epochs:
 
 def span(found: Sentences, rows: Ints, field: int) -> tuple[Ints, Ints]:
     """Where field ``field`` (from 1) of the sentences ``rows`` (k,) begins and ends; empty where there is none."""
-    last = found.commas.size - 1
-    comma = found.first_comma[rows] + (field - 1)
-    stop = found.stop[rows]
-    begin = np.minimum(found.commas[np.minimum(comma, last)] + 1, stop)
-    end = np.minimum(found.commas[np.minimum(comma + 1, last)], stop)
-    return begin, np.maximum(begin, end)
+    mark, stop = found.first_mark[rows] + (field - 1), found.stop[rows]
+    short = found.fields[rows] < field
+    mark = np.where(short, 0, mark)
+    return np.where(short, stop, found.marks[mark] + 1), np.where(short, stop, found.marks[mark + 1])
 
 
 def find_holders(found: Sentences, codes: Ints) -> Holders:
@@ -98,7 +96,7 @@ def find_holders(found: Sentences, codes: Ints) -> Holders:
     own = found.take(rows)
     with_crc = _with_right_crc(own, codes)
     fewest = np.array([layout.fewest for layout in LAYOUTS])[codes % SECOND_ANTENNA]
-    whole = ~own.has_checksum & (own.field_count() >= fewest)
+    whole = ~own.has_checksum & (own.fields >= fewest)
     use = np.flatnonzero(own.right_checksum | with_crc | whole)
     rows, codes, own, with_crc = rows[use], codes[use], own.take(use), with_crc[use]
     n = rows.size
@@ -134,7 +132,7 @@ def find_holders(found: Sentences, codes: Ints) -> Holders:
 
 def zda_days(found: Sentences) -> tuple[Floats, Floats]:
     """Times of day (k,) of the ZDA sentences of a piece, and the days since 1970-01-01 that they state."""
-    zda = found.take(np.flatnonzero((found.kind == b"ZDA") & found.right_checksum))
+    zda = found.take(np.flatnonzero((found.kind == Kind.ZDA) & found.right_checksum))
     return time_of_day_s(zda, 1), days(_field(zda, 2).values, _field(zda, 3).values, _field(zda, 4).values)
 
 

@@ -1,4 +1,6 @@
-"""Where each kind of NMEA sentence holds a position and what goes with it. Fields are counted from 1 after the address.
+"""Where each kind of NMEA sentence holds a position and what goes with it.
+
+Fields are counted from 1 after the address, $PTNL's after the name that follows it.
 
 GGA, RMC, GNS and GLL after IEC 61162-1; $PTNL,GGK after Trimble's NMEA-0183 message descriptions; $PUBX,00 after the
 u-blox M8 protocol specification; $KSXT after the Unicore reference commands (decimal degrees, and east, north, up from
@@ -12,10 +14,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sccal.arrays import Bools, Ints
 from sccal.degrade.quality import MODE_LETTERS
-from sccal.logs.sentences import Sentences
+from sccal.logs.sentences import Kind, Sentences
 
 Claim = Literal["gga", "mode", "modes", "ggk", "ksxt", "pashr", "pubx"]
 
@@ -72,7 +75,7 @@ LAYOUTS = (
     Layout("RMC", 1, 3, 5, "mode", 12, (7, 8, 10, 11), ((2, "V"), (12, "N")), 9, status=2),
     Layout("GNS", 1, 2, 4, "modes", 6, (9, 10, 11, 12), ((7, "00"), (8, "99.99")), 11, hdop=8),
     Layout("GLL", 5, 1, 3, "mode", 7, (), ((6, "V"), (7, "N")), 5, status=6),
-    Layout("PTNL,GGK", 2, 4, 6, "ggk", 8, (10, 11), ((8, "0"), (9, "00")), 11, hdop=10),
+    Layout("PTNL,GGK", 1, 3, 5, "ggk", 7, (9, 10), ((7, "0"), (8, "00")), 10, hdop=9),
     Layout(
         name="KSXT",
         time=1,
@@ -106,7 +109,7 @@ SECOND_ANTENNA = len(LAYOUTS)
 """Codes from here on are the first four layouts for the second antenna."""
 NOT_A_POSITION = -1
 _STANDARD = {b"GGA": 0, b"RMC": 1, b"GNS": 2, b"GLL": 3}
-_PROPRIETARY = ((b"PTNL,GGK,", 4), (b"KSXT,", 5), (b"PUBX,00,", 6), (b"PASHR,POS,", 7))
+_PROPRIETARY = ((b"KSXT,", 5), (b"PUBX,00,", 6), (b"PASHR,POS,", 7))
 
 
 def layout_of(code: int) -> Layout:
@@ -117,10 +120,12 @@ def layout_of(code: int) -> Layout:
 def find_layouts(found: Sentences) -> Ints:
     """For every sentence (n,) its code: the index of its layout, NOT_A_POSITION for others."""
     codes = np.full(found.start.size, NOT_A_POSITION, dtype=np.int64)
+    formatter = formatters(found)
     for kind, code in _STANDARD.items():
-        codes[found.kind == kind] = code
+        codes[formatter == kind] = code
     address = found.data[found.start[:, None] + np.arange(1, 3)] & 0xDF
-    for first, second in (b"PT", b"KS", b"PU", b"PA"):
+    codes[found.kind == Kind.GGK] = 4
+    for first, second in (b"KS", b"PU", b"PA"):
         for text, code in _PROPRIETARY:
             if text[0] == first and text[1] == second:
                 rows = np.flatnonzero((address[:, 0] == first) & (address[:, 1] == second))
@@ -130,6 +135,17 @@ def find_layouts(found: Sentences) -> Ints:
     for kind, code in _STANDARD.items():
         codes[rows[_begins(found, rows, kind + b"H,", 3)]] = SECOND_ANTENNA + code
     return codes
+
+
+def formatters(found: Sentences) -> NDArray[np.bytes_]:
+    """The three letters after the talker (n,), upper case; empty for what is not a five-letter address."""
+    address = found.data[found.start[:, None] + np.arange(1, 7)]
+    lower = (address >= 97) & (address <= 122)
+    address = np.where(lower, address - 32, address).astype(np.uint8)
+    letters = ((address[:, :5] >= 65) & (address[:, :5] <= 90)).all(axis=1)
+    usual = letters & (address[:, 5] == ord(",")) & (address[:, 0] != ord("P")) & (found.start + 6 < found.stop)
+    kinds = np.ascontiguousarray(address[:, 2:5]).view("S3").ravel()
+    return np.where(usual, kinds, b"").astype("S3")
 
 
 def _begins(found: Sentences, rows: Ints, text: bytes, at: int = 1) -> Bools:

@@ -16,7 +16,7 @@ import numpy as np
 from sccal.arrays import Floats, Ints
 from sccal.degrade.epochs import Epochs, Holders, find_holders, gathered, zda_days
 from sccal.degrade.faults import FaultedFixes, Faults, fault_fixes, filled_times, on_the_day
-from sccal.degrade.layouts import NOT_A_POSITION, find_layouts
+from sccal.degrade.layouts import NOT_A_POSITION, find_layouts, formatters
 from sccal.degrade.rewriting import Plan, kind_name, rewritten_piece
 from sccal.errors import DataError
 from sccal.logs.sentences import Sentences, find_sentences
@@ -111,7 +111,7 @@ def _kinds(found: Sentences, codes: Ints) -> Counter[str]:
     for code in np.unique(codes[~wrong]).tolist():
         if code != NOT_A_POSITION:
             counts[kind_name(code)] += int(np.count_nonzero((codes == code) & ~wrong))
-    kinds, numbers = np.unique(found.kind[(codes == NOT_A_POSITION) & ~wrong], return_counts=True)
+    kinds, numbers = np.unique(formatters(found)[(codes == NOT_A_POSITION) & ~wrong], return_counts=True)
     for kind, number in zip(kinds.tolist(), numbers.tolist(), strict=True):
         counts[kind.decode("ascii") or "other"] += number
     if wrong.any():

@@ -21,7 +21,7 @@ from sccal.degrade.faults import FaultedFixes, Faults
 from sccal.degrade.layouts import CLAIMS, SECOND_ANTENNA, Layout, layout_of
 from sccal.degrade.places import moved
 from sccal.degrade.quality import written_hdop
-from sccal.logs.sentences import Sentences
+from sccal.logs.sentences import Kind, Sentences
 
 _MOST_PLACES = {False: 11, True: 13}
 """Places up to which a float holds minutes and degrees; further ones are written as zeros."""
@@ -61,8 +61,7 @@ class _Piece:
 
     def has(self, rows: Ints, field: int) -> Bools:
         """Which sentences have that field, empty or not."""
-        commas, comma = self.found.commas, self.found.first_comma[rows] + (field - 1)
-        there: Bools = commas[np.minimum(comma, commas.size - 1)] < self.found.stop[rows]
+        there: Bools = self.found.fields[rows] >= field
         return there
 
     def put(self, rows: Ints, begin: Ints, end: Ints, text: Bytes) -> None:
@@ -105,7 +104,7 @@ def rewritten_piece(
     _close(piece, holders)
     counts = _counts(holders, piece.touched[holders.row])
     if plan.faults.gst:
-        gst = int(np.count_nonzero(piece.touched & (found.kind == b"GST")))
+        gst = int(np.count_nonzero(piece.touched & (found.kind == Kind.GST)))
         counts.update({"GST": gst} if gst else {})
     for rows in dropped:
         _leave_out(piece, holders.row[rows], holders.with_crc[rows])
@@ -253,7 +252,7 @@ def _put_modes(piece: _Piece, rows: Ints, letter: Bytes, over_none: bool) -> Non
 def _widen_gst(piece: _Piece) -> None:
     """The noise put into the error fields of GST."""
     found, plan = piece.found, piece.plan
-    rows = np.flatnonzero((found.kind == b"GST") & (found.right_checksum | (~found.has_checksum & found.complete)))
+    rows = np.flatnonzero((found.kind == Kind.GST) & (found.right_checksum | (~found.has_checksum & found.complete)))
     part = found.take(rows)
     epoch = plan.epochs.at(time_of_day_s(part, 1))
     rows = rows[(epoch >= 0) & plan.fixes.noisy[epoch] & ~plan.fixes.lost[epoch]]
