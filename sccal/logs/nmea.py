@@ -34,7 +34,15 @@ def read_nmea(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
     if not raw:
         raise DataError(f"{path}: is empty (0 bytes); log it again or remove the run")
-    source = path.name
+    return parse_nmea(raw, str(path), path.name)
+
+
+def parse_nmea(raw: bytes, path: str, source: str) -> tuple[FixStream, tuple[Notice, ...]]:
+    """The fixes in the bytes of an NMEA log; ``path`` names it in errors, ``source`` in notices.
+
+    Raises:
+        DataError: no sentence, or no fix.
+    """
     notices: list[Notice] = []
     found = find_sentences(raw)
     if found.start.size == 0:
