@@ -20,6 +20,7 @@ from sccal.errors import DataError, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import find_start
+from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, discover, read_run
 from sccal.logs.streams import Vehicle
 from sccal.report.diagnosis_write import write_diagnosis
@@ -66,10 +67,11 @@ def calibrate_paths(
     out: Path,
     options: CalibrationOptions,
     tell: Callable[[RunSource, Calibration | SccalError], None],
+    read: ReadOptions | None = None,
 ) -> Batch:
     """Calibrate every run below the paths, write what each gives to out/<run>, then the vehicles to out.
 
-    ``tell`` is called after each run, with its result or with why there is none.
+    ``tell`` is called after each run, with its result or with why there is none; ``read`` is for logs of messages.
     """
     sources, failures = find_runs(paths)
     batch = Batch(failures=failures)
@@ -80,7 +82,7 @@ def calibrate_paths(
     of_vehicle: dict[tuple[object, ...], list[tuple[Calibration, RunProblem]]] = {}
     for source in sources:
         try:
-            calibration, problem = calibrate_run(read_run(source), options)
+            calibration, problem = calibrate_run(read_run(source, read), options)
             if options.effects:
                 calibration = with_honest_effects(calibration, problem)
             write_calibration(calibration, out / source.name)
@@ -107,7 +109,7 @@ def calibrate_paths(
 
 
 def diagnose_paths(
-    paths: Sequence[Path], out: Path, options: CalibrationOptions
+    paths: Sequence[Path], out: Path, options: CalibrationOptions, read: ReadOptions | None = None
 ) -> tuple[list[tuple[Diagnosis, Path]], list[Failure]]:
     """Diagnose every vehicle below the paths, all its runs together, and write what is found to out.
 
@@ -121,7 +123,7 @@ def diagnose_paths(
     of_vehicle: dict[tuple[object, ...], list[Aligned]] = {}
     for source in sources:
         try:
-            aligned = align(read_run(source))
+            aligned = align(read_run(source, read))
             find_start(aligned)
         except Exception as error:
             failures.append(Failure(source.name, error if isinstance(error, SccalError) else _as_known(error)))

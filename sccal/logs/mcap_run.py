@@ -51,6 +51,10 @@ class _Log:
         """The topic as notices name it."""
         return f"{self.path.name} {topic}"
 
+    def messages(self, topic: str) -> Messages | None:
+        """A topic's messages; the first slash of its name may be left out."""
+        return next((m for name, m in self.found.items() if name.lstrip("/") == topic.lstrip("/")), None)
+
     def listed(self) -> str:
         """All topics with their types."""
         topics = [f"{topic} ({kind})" for topic, kind in sorted(self.seen.items())]
@@ -93,7 +97,7 @@ def _asked_paths(options: ReadOptions) -> dict[str, list[str]]:
         value = getattr(options, name)
         if value:
             topic, path = _split(name, value)
-            asked.setdefault(topic, []).append(path)
+            asked.setdefault(topic.lstrip("/"), []).append(path)
     for pair in (("left_ticks", "right_ticks"), ("left_rad", "right_rad"), ("latitude", "longitude")):
         given = [name for name in pair if getattr(options, name)]
         if len(given) == 1:
@@ -118,7 +122,7 @@ def _option(name: str) -> str:
 def _asked_column(log: _Log, name: str) -> tuple[Messages, str]:
     """The messages and column that an option names."""
     topic, path = _split(name, getattr(log.options, name))
-    messages = log.found.get(topic)
+    messages = log.messages(topic)
     if messages is None:
         raise DataError(f"{log.path}: {_option(name)}: no messages on {topic}; the log has {log.listed()}")
     if f":{path}" not in messages.values:
@@ -136,7 +140,7 @@ def _chosen(
     Raises DataError with the candidates, and the option that chooses among them.
     """
     if asked:
-        messages = log.found.get(asked) or log.found.get(f"/{asked}")
+        messages = log.messages(asked)
         if messages is None:
             raise DataError(f"{log.path}: {option} {asked}: no such topic with messages; the log has {log.listed()}")
         if messages.kind not in [kind for kind, _ in ranks]:

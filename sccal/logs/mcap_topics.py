@@ -148,7 +148,7 @@ class Topics:
     """Opens the channels of one log and holds what they gave."""
 
     asked: Mapping[str, Sequence[str]]
-    """Paths asked for on the command line, by topic."""
+    """Paths asked for on the command line, by topic without its first slash."""
     sinks: dict[str, list[ChannelSink]] = field(default_factory=dict)
     seen: dict[str, str] = field(default_factory=dict)
     """Type name by topic, of all channels of the log."""
@@ -159,7 +159,7 @@ class Topics:
         """The sink for a channel, or None where its messages cannot be of use."""
         self.seen.setdefault(channel.topic, channel.type_name or channel.message_encoding)
         kind = kind_of(channel.type_name)
-        asked = self.asked.get(channel.topic, ())
+        asked = self.asked.get(channel.topic.lstrip("/"), ())
         if not kind and not asked and not _may_be_cause(channel.type_name):
             return None
         picker = _picker(kind, asked)
