@@ -148,6 +148,9 @@ def calibrate(
     read: ReadOptions,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
+    from sccal.logs.mcap_magic import require_any_mcap
+
+    require_any_mcap(paths)
     import numpy as np
 
     from sccal.batch import calibrate_paths
@@ -219,6 +222,9 @@ def diagnose(
     read: ReadOptions,
 ) -> None:
     """What the model lacks in the runs below PATHS: name it, add it, and judge before and after on data held out."""
+    from sccal.logs.mcap_magic import require_any_mcap
+
+    require_any_mcap(paths)
     from sccal.batch import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.report.diagnosis_text import diagnosis_text

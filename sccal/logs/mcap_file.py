@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from sccal.arrays import Ints
 from sccal.errors import DataError
 from sccal.logs.mcap_chunks import DamagedError, decompressed
+from sccal.logs.mcap_magic import MAGIC, require_mcap
 from sccal.logs.streams import Notice
 
 Bytes = NDArray[np.uint8]
 
-MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _DATA_END = 2, 3, 4, 5, 6, 8, 15
 _HEAD_BYTES = 9
 _MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
@@ -61,19 +61,13 @@ def read_mcap(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
     """Hand every wanted message of the file to its channel's sink; tell what was broken.
 
     Raises:
-        DataError: the file cannot be read, or is no MCAP file.
+        DataError: the file cannot be read, is empty, or is no MCAP file.
     """
+    require_mcap(path)
     try:
-        size = path.stat().st_size
-        if size == 0:
-            raise DataError(f"{path}: is empty (0 bytes); log it again or remove it")
         data = np.asarray(np.memmap(path, dtype=np.uint8, mode="r"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
-    if data[: len(MAGIC)].tobytes() != MAGIC:
-        raise DataError(
-            f"{path}: not an MCAP file: it begins with {data[:8].tobytes().hex(' ')}, not with {MAGIC.hex(' ')}"
-        )
     return _Walk(path, data, open_channel).run()
 
 
@@ -94,6 +88,8 @@ class _Walk:
     schemas: dict[int, tuple[str, str, bytes]] = field(default_factory=dict)
     sinks: dict[int, Sink | None] = field(default_factory=dict)
     chunk_starts: list[int] = field(default_factory=list)
+    loose: list[int] = field(default_factory=list)
+    """Places of messages outside chunks, not yet handed on."""
     batch: _Batch = field(default_factory=_Batch)
     lost: dict[str, tuple[int, str]] = field(default_factory=dict)
     """What was lost, with how often and where first."""
@@ -105,8 +101,6 @@ class _Walk:
         self._read_summary(view)
         head = struct.Struct("<BQ").unpack_from
         position, ended = len(MAGIC), False
-        loose: list[int] = []
-        crc_from = 0
         while position + _HEAD_BYTES <= size:
             opcode, length = head(view, position)
             begin = position + _HEAD_BYTES
@@ -122,22 +116,22 @@ class _Walk:
                 position = resumed
                 continue
             if opcode == _MESSAGE:
-                loose.append(position)
-                if len(loose) >= _BATCH_RECORDS:
-                    self._messages(self.data, np.array(loose))
-                    loose.clear()
+                self.loose.append(position)
+                if len(self.loose) >= _BATCH_RECORDS:
+                    self._flush()
             elif opcode == _CHUNK:
                 self._chunk(view, position, begin, end, cut=False)
             elif opcode in (_SCHEMA, _CHANNEL):
                 self._declare(opcode, view[begin:end], position)
             elif opcode in (_DATA_END, _FOOTER):
                 ended = True
+                self._flush()
+                if bytes(view[-len(MAGIC) :]) != MAGIC:
+                    self._lose("bytes of a cut index not used; all messages are read", size - position, position)
                 if opcode == _DATA_END and length >= 4:
-                    self._check_data_crc(view[crc_from:position], begin)
+                    self._check_data_crc(view[:position], begin)
                 break
             position = end
-        if loose:
-            self._messages(self.data, np.array(loose))
         self._flush()
         if not ended:
             self._break(position, size - position, "without its closing records")
@@ -250,6 +244,10 @@ class _Walk:
             self._flush()
 
     def _flush(self) -> None:
+        if self.loose:
+            starts = np.array(self.loose, dtype=np.int64)
+            self.loose.clear()
+            self._messages(self.data, starts)
         batch, self.batch = self.batch, _Batch()
         if batch.parts:
             data = np.frombuffer(b"".join(batch.parts), dtype=np.uint8)
