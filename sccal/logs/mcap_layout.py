@@ -115,6 +115,8 @@ class Gatherer:
     """Which messages could not be read."""
     why: str = ""
     """What was wrong with the first of them."""
+    walks: int = 0
+    """Layouts met, or met again after too many others."""
     _layouts: dict[int, list[_Layout]] = field(default_factory=dict)
 
     def take(self, data: Bytes, begin: Ints, end: Ints, first: int) -> None:
@@ -150,6 +152,7 @@ class Gatherer:
             assert index.size < before
 
     def _layout(self, message: bytes) -> _Layout:
+        self.walks += 1
         shape = self.walker.shape(message)
         texts = {
             path: message[place.offset : place.offset + place.width].decode("utf-8", "replace")

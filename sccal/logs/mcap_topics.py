@@ -69,6 +69,8 @@ _NO_CAUSE = re.compile(
 _CAUSES_OF_SENSOR_MSGS = ("BatteryState", "Temperature", "RelativeHumidity", "FluidPressure", "Illuminance", "Range")
 _LARGEST_CAUSE_BYTES = 4096
 _MOST_CAUSES = 32
+_MOST_CAUSE_LAYOUTS = 200
+"""A topic whose messages differ more than this in their texts and lengths is a log of words, not of numbers."""
 
 
 def kind_of(type_name: str) -> str:
@@ -131,9 +133,14 @@ class ChannelSink:
     log_ns: list[Ints] = field(default_factory=list)
     publish_ns: list[Ints] = field(default_factory=list)
     count: int = 0
+    given_up: bool = False
 
     def take(self, data: Bytes, begin: Ints, end: Ints, log_ns: Ints, publish_ns: Ints) -> None:
         """As Sink.take."""
+        if self.only_causes and isinstance(self.gatherer, Gatherer) and self.gatherer.walks > _MOST_CAUSE_LAYOUTS:
+            self.given_up = True
+        if self.given_up:
+            return
         if self.only_causes and begin.size and int((end - begin).max()) > _LARGEST_CAUSE_BYTES:
             small = end - begin <= _LARGEST_CAUSE_BYTES
             begin, end, log_ns, publish_ns = begin[small], end[small], log_ns[small], publish_ns[small]
@@ -184,7 +191,9 @@ class Topics:
         ]
         for topic, sinks in self.sinks.items():
             kinds = [kind_of(sink.channel.type_name) for sink in sinks]
-            own = [sink for sink, kind in zip(sinks, kinds, strict=True) if kind == kinds[0]]
+            own = [s for s, kind in zip(sinks, kinds, strict=True) if kind == kinds[0] and not s.given_up]
+            if not own:
+                continue
             messages = _collected(topic, kinds[0], own, f"{source} {topic}", time, notices)
             if messages.t_s.size:
                 found[topic] = messages

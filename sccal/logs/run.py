@@ -210,14 +210,18 @@ def _natural(path: Path) -> list[list[tuple[int, int, str]]]:
 
 
 def _with_unique_names(sources: list[RunSource]) -> list[RunSource]:
-    names = [source.name for source in sources]
+    roots: dict[str, set[Path | None]] = {}
+    for source in sources:
+        roots.setdefault(source.name, set()).add(source.searched_up_to)
     taken: set[str] = set()
     unique = []
     for source in sources:
         name = source.name
-        if names.count(name) > 1:
+        if len(roots[name]) > 1:
             root = source.searched_up_to or source.path
             name = f"{root.resolve().name}/{name}" if root.resolve().name and source.path != root else name
+        if name in taken and source.path.is_file():
+            name += source.path.suffix
         candidate, number = name, 2
         while candidate in taken:
             candidate, number = f"{name}-{number}", number + 1

@@ -87,7 +87,9 @@ def test_either_byte_order_reads_the_same(values: list[dict[str, Any]]) -> None:
 
     store = get_typestore(Stores.ROS2_HUMBLE)
     little = [cdr(JOINTS, one) for one in values]
-    big = [bytes(store.serialize_cdr(store.deserialize_cdr(raw, JOINTS), JOINTS, little_endian=False)) for raw in little]
+    big = [
+        bytes(store.serialize_cdr(store.deserialize_cdr(raw, JOINTS), JOINTS, little_endian=False)) for raw in little
+    ]
     assert big[0][:2] == b"\0\0"
     walker = RosWalker(known_definitions(), "sensor_msgs/JointState")
     assert take(Gatherer(walker, everything), big) == take(Gatherer(walker, everything), little)
