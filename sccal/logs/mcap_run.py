@@ -80,9 +80,10 @@ def read_message_log(
         why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
         raise DataError(f"{path}: no message can be read: {why}")
     try:
-        wheels, wheel_notices, wheel_topics = _wheels(log)
-        heading, heading_notices, heading_topics = _heading(log)
-        fixes, fix_notices, fix_topics = _fixes(log)
+        with np.errstate(over="ignore", invalid="ignore"):  # whatever numbers broken bytes hold
+            wheels, wheel_notices, wheel_topics = _wheels(log)
+            heading, heading_notices, heading_topics = _heading(log)
+            fixes, fix_notices, fix_topics = _fixes(log)
     except DataError as error:
         lost = "; ".join(str(notice) for notice in (*notices, *unread))
         raise DataError(f"{error} ({lost})") if lost else error from None

@@ -15,6 +15,7 @@ from sccal.errors import DataError, SccalError
 from sccal.logs.streams import Run
 from tests.message_logs import LZ4, NO_CHUNKS, NO_INDEX, PLAIN, Message, cdr, read_bytes, ros2_bytes, stamp
 
+pytestmark = pytest.mark.filterwarnings("error")
 ROWS = 300
 
 
