@@ -5,7 +5,8 @@ from __future__ import annotations
 _BLIND_BYTES = 64 << 20
 """Claims up to this size are allocated at once."""
 _STEP_BYTES = 8 << 20
-_LIMIT_BYTES = 4 << 30
+_MOST_TIMES = 256
+"""A larger chunk that claims to have been compressed by more than this (LZ4's limit) holds no log."""
 
 
 class DamagedError(Exception):
@@ -18,14 +19,15 @@ def decompressed(raw: memoryview, compression: str, claimed: int, cut: bool) -> 
     Raises:
         DamagedError: unknown compression, broken data, or a size other than ``claimed``.
     """
-    if claimed > _LIMIT_BYTES:
-        raise DamagedError(f"a size of {claimed} bytes is claimed")
+    if not cut and claimed > max(_BLIND_BYTES, _MOST_TIMES * len(raw)):
+        raise DamagedError(f"{len(raw)} bytes claim to hold {claimed}")
+    room = min(claimed, max(_BLIND_BYTES, _MOST_TIMES * len(raw)))
     if compression == "":
         content = bytes(raw)
     elif compression == "zstd":
-        content = _zstd(raw, claimed, cut)
+        content = _zstd(raw, room, cut)
     elif compression == "lz4":
-        content = _lz4(raw, claimed, cut)
+        content = _lz4(raw, room, cut)
     else:
         raise DamagedError(f"compression {compression[:20]!r} is not known (only lz4, zstd and none are)")
     if not cut and len(content) != claimed:

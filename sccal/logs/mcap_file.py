@@ -308,8 +308,11 @@ def _record_starts(content: bytes) -> tuple[Ints, bool]:
     position, size = 0, len(content)
     last = size - _HEAD_BYTES
     while position <= last:
+        length = length_at(content, position + 1)[0]
+        if not length:  # no record is empty: these are zeros, of which there may be very many
+            return np.array(starts, dtype=np.int64), False
         add(position)
-        position += _HEAD_BYTES + length_at(content, position + 1)[0]
+        position += _HEAD_BYTES + length
     if position > size:
         starts.pop()
     return np.array(starts, dtype=np.int64), position == size

@@ -180,7 +180,7 @@ class ProtobufWalker:
             where = f"{path}.{one.name}" if path else one.name
             if one.type in _KINDS:
                 shape.numbers.setdefault(where, Place(0, 0, "zero"))
-            elif one.type == _MESSAGE and depth < 6:
+            elif one.type == _MESSAGE and depth < 4:
                 self._absent(self.messages.get(one.message, {}), set(), where, shape, depth + 1)
 
     def _packed(self, data: bytes, origin: int, begin: int, end: int, path: str, kind: str, shape: Shape) -> None:

@@ -29,6 +29,7 @@ _CODES = {
     "float64": "f8",
 }
 _DEEPEST = 24
+_MOST_VISITS = 100_000
 _NAMED_ELEMENTS = 512
 """Elements of an array beyond these are skipped: no field of use stands there."""
 
@@ -61,7 +62,7 @@ class _Walk:
         self.shape = Shape()
         self.order = "<"
         self.most_aligned = 8
-        self.origin = self.position = 0
+        self.origin = self.position = self.visits = 0
 
     def run(self) -> Shape:
         if not self.ros1:
@@ -114,6 +115,9 @@ class _Walk:
             self._note(f"{path}[{i}]", begin + i * size, code)
 
     def _value(self, one: FieldDefinition, path: str, depth: int) -> None:
+        self.visits += 1
+        if self.visits > _MOST_VISITS:
+            raise _UnsupportedError
         code = _CODES.get(one.type)
         if code is not None:
             size = int(code[1])
