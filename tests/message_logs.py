@@ -119,9 +119,10 @@ def as_dict(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else list(value) if hasattr(value, "typecode") else value
 
 
-def as_json(messages: Iterable[Message]) -> bytes:
+def as_json(messages: Iterable[Message], **settings: Any) -> bytes:
     """The same messages as JSON."""
-    return json_bytes((topic, kind, ns, as_dict(decoded(kind, raw))) for topic, kind, ns, raw in messages)
+    rows = ((topic, kind, ns, as_dict(decoded(kind, raw))) for topic, kind, ns, raw in messages)
+    return json_bytes(rows, **settings)
 
 
 _NUMBERS = {"double": 1, "int64": 3, "int32": 5, "uint32": 13, "sint32": 17, "fixed64": 6, "float": 2, "bool": 8}
@@ -145,6 +146,16 @@ PROTO = {
         "angular_velocity_covariance": "double*",
         "linear_acceleration": "Vector3",
         "linear_acceleration_covariance": "double*",
+    },
+    "Status": {"status": "int32"},
+    "NavSatFix": {
+        "header": "Header",
+        "status": "Status",
+        "latitude": "double",
+        "longitude": "double",
+        "altitude": "double",
+        "position_covariance": "double*",
+        "position_covariance_type": "int32",
     },
     "Sentence": {"header": "Header", "sentence": "string"},
     "LocationFix": {
@@ -183,6 +194,8 @@ def proto_classes(package: str, types: Mapping[str, Mapping[str, str]] = PROTO) 
 def fill(message: Any, values: Mapping[str, Any]) -> Any:
     """Set a protobuf message's fields."""
     for name, value in values.items():
+        if name not in message.DESCRIPTOR.fields_by_name:
+            continue
         if isinstance(value, Mapping):
             fill(getattr(message, name), value)
         elif isinstance(value, list):
@@ -192,11 +205,11 @@ def fill(message: Any, values: Mapping[str, Any]) -> Any:
     return message
 
 
-def as_protobuf(messages: Iterable[Message], package: str = "sensor_msgs.msg") -> bytes:
+def as_protobuf(messages: Iterable[Message], package: str = "sensor_msgs.msg", **settings: Any) -> bytes:
     """The same messages as protobuf, by types of the same field names."""
     classes, descriptors = proto_classes(package)
     file = io.BytesIO()
-    writer = Writer(file, chunk_size=8192)
+    writer = Writer(file, **{"chunk_size": 8192, **settings})
     writer.start(profile="", library="test")
     channels: dict[str, int] = {}
     for topic, type_name, ns, raw in messages:

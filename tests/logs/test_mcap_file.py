@@ -6,14 +6,29 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sccal.errors import DataError, SccalError
+from sccal.logs.mcap_chunks import DamagedError, decompressed
 from sccal.logs.streams import Run
-from tests.message_logs import LZ4, NO_CHUNKS, NO_INDEX, PLAIN, Message, cdr, read_bytes, ros2_bytes, stamp
+from tests.message_logs import (
+    LZ4,
+    NO_CHUNKS,
+    NO_INDEX,
+    PLAIN,
+    Message,
+    as_json,
+    as_protobuf,
+    cdr,
+    read_bytes,
+    ros2_bytes,
+    stamp,
+)
 
 pytestmark = pytest.mark.filterwarnings("error")
 ROWS = 300
@@ -177,7 +192,7 @@ def test_messages_out_of_order_in_the_file_are_read_by_their_times(tmp_path: Pat
     assert lost(run) == []
 
 
-@pytest.mark.parametrize("way", ["no_chunks", "plain", "lz4", "zstd"])
+@pytest.mark.parametrize("way", ["no_chunks", "plain", "lz4", "zstd", "json", "protobuf"])
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_no_bytes_whatever_do_more_than_lose_messages(way: str, tmp_path: Path, data: st.DataObject) -> None:
@@ -206,3 +221,29 @@ def read_or_error(folder: Path, data: bytes) -> Run | str:
 
 
 SMALL = {way: ros2_bytes(run_messages(12), **{"chunk_size": 1000, **WAYS[way]}) for way in WAYS}
+SMALL["json"] = as_json(run_messages(12), **NO_CHUNKS)
+SMALL["protobuf"] = as_protobuf(run_messages(12), **NO_CHUNKS)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_of_very_many_zeros_is_small_work(compression: str, tmp_path: Path) -> None:
+    """Honest about its size, within what may be believed, and of no use."""
+    zeros = bytes(60 << 20)
+    packed = zstandard.compress(zeros) if compression == "zstd" else lz4.frame.compress(zeros)
+    body = struct.pack("<QQQI", 0, 0, len(zeros), 0) + struct.pack("<I", len(compression)) + compression.encode()
+    body += struct.pack("<Q", len(packed)) + packed
+    data = ros2_bytes(MESSAGES)
+    place = chunk_places(data)[2]
+    run = read_bytes(tmp_path, data[:place] + struct.pack("<BQ", 6, len(body)) + body + data[place:])
+    assert run.wheels.t_s.size == ROWS
+    assert any("end within a record" in told for told in lost(run))
+
+
+@given(st.binary(max_size=4000), st.sampled_from(["zstd", "lz4", ""]), st.floats(0, 1))
+def test_a_cut_chunk_gives_its_beginning(content: bytes, compression: str, share: float) -> None:
+    packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress, "": bytes}[compression](content)
+    part = decompressed(memoryview(packed)[: int(share * len(packed))], compression, len(content), cut=True)
+    assert content.startswith(part)
+    assert decompressed(memoryview(packed), compression, len(content), cut=False) == content
+    with pytest.raises(DamagedError):
+        decompressed(memoryview(packed), compression, len(content) + 1, cut=False)
