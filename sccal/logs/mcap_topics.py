@@ -318,10 +318,16 @@ def _collected(
         topic=topic,
         type_name=sinks[0].channel.type_name,
         kind=kind,
-        t_s=chosen_ns / 1e9,
-        log_s=log_ns / 1e9,
+        t_s=seconds_of(chosen_ns),
+        log_s=seconds_of(log_ns),
         number=np.arange(1, count + 1, dtype=np.int64),
         values=values,
         texts=tuple(texts),
     )
     return messages.take(order)
+
+
+def seconds_of(ns: Ints) -> Floats:
+    """The nearest numbers of seconds (n) to nanoseconds (n); dividing at once would round twice, and shift stamps of one time apart."""
+    seconds: Floats = ns // 1_000_000_000 + (ns % 1_000_000_000) / 1e9
+    return seconds

@@ -131,7 +131,7 @@ def sentences(nmea: bytes, path: Path) -> Stamped:
     found = [(float(stamp), text) for stamp, text in _SENTENCE.findall(nmea)]
     if not found:
         raise DataError(f"{path}: no NMEA sentence has a receive time before it; write the fixes instead")
-    stamp_ns = _nanoseconds(np.array([t for t, _ in found]))
+    stamp_ns = nanoseconds_of(np.array([t for t, _ in found]))
     messages = []
     for ns, (_, text) in zip(stamp_ns.tolist(), found, strict=True):
         head = struct.pack("<4BiI", 0, 1, 0, 0, *divmod(ns, 1_000_000_000)) + struct.pack("<I5s", 5, b"gnss\0")
@@ -161,7 +161,7 @@ def _encoded(
     root = type_name.replace("/msg/", "/")
     blank = _Blank(texts, counts).encoded(root)
     places = RosWalker(known_definitions(), root).shape(blank).numbers
-    stamp_ns = _nanoseconds(t_s)
+    stamp_ns = nanoseconds_of(t_s)
     rows: NDArray[np.uint8] = np.tile(np.frombuffer(blank, dtype=np.uint8), (t_s.size, 1))
     columns: dict[str, Floats | Ints] = dict(numbers)
     if "header.stamp.sec" in places:
@@ -214,7 +214,8 @@ class _Blank:
         self.data += value.to_bytes(size, "little")
 
 
-def _nanoseconds(t_s: Floats) -> Ints:
+def nanoseconds_of(t_s: Floats) -> Ints:
+    """Whole nanoseconds of times in seconds (n)."""
     whole = np.floor(t_s)
     return whole.astype(np.int64) * 1_000_000_000 + np.round((t_s - whole) * 1e9).astype(np.int64)
 

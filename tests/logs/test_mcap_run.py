@@ -24,7 +24,8 @@ from sccal.errors import DataError, UsageError
 from sccal.logs.mcap_definitions import full_text
 from sccal.logs.mcap_fixes import quality_of
 from sccal.logs.mcap_heading import euler
-from sccal.logs.mcap_write import write_mcap
+from sccal.logs.mcap_topics import seconds_of
+from sccal.logs.mcap_write import nanoseconds_of, write_mcap
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
@@ -549,6 +550,16 @@ def test_the_time_asked_for_is_read(tmp_path: Path) -> None:
         assert run.wheels.t_s[0] == pytest.approx(first)
         assert run.heading.t_s[0] == pytest.approx(first)
         assert run.fixes.host_t_s[0] == pytest.approx(first)
+
+
+@given(st.lists(st.floats(0.0, 4e9), min_size=1, max_size=20))
+def test_stamps_come_back_as_they_were(t_s: list[float]) -> None:
+    """To half a nanosecond; for Unix times that is the very same number."""
+    given_s = np.array(t_s)
+    back_s = seconds_of(nanoseconds_of(given_s))
+    np.testing.assert_allclose(back_s, given_s, rtol=0, atol=1e-9)
+    unix = given_s > 1e8
+    assert (back_s[unix] == given_s[unix]).all()
 
 
 def test_empty_stamps_are_read_by_their_log_time(tmp_path: Path) -> None:
