@@ -243,9 +243,8 @@ def write_db3(messages: Iterable[Message], folder: Path) -> Path:
     return folder
 
 
-def write_ros1(messages: Iterable[Message], path: Path) -> Path:
-    """The same messages as a ROS 1 bag."""
-    from rosbags.rosbag1 import Writer
+def as_ros1(type_name: str, raw: bytes) -> bytes:
+    """One message as ROS 1 writes it."""
     from rosbags.typesys import Stores, get_typestore
 
     ours, theirs = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
@@ -258,13 +257,28 @@ def write_ros1(messages: Iterable[Message], path: Path) -> Path:
             fields["seq"] = 7
         return theirs.types[value.__msgtype__](**fields)
 
+    return bytes(theirs.serialize_ros1(converted(ours.deserialize_cdr(raw, type_name)), type_name))
+
+
+def ros1_definition(type_name: str) -> str:
+    """A type's definition as ROS 1 logs it."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return str(get_typestore(Stores.ROS1_NOETIC).generate_msgdef(type_name)[0])
+
+
+def write_ros1(messages: Iterable[Message], path: Path) -> Path:
+    """The same messages as a ROS 1 bag."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    theirs = get_typestore(Stores.ROS1_NOETIC)
     with Writer(path) as writer:
         connections: dict[str, Any] = {}
         for topic, type_name, ns, raw in messages:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, type_name, typestore=theirs)
-            message = converted(ours.deserialize_cdr(raw, type_name))
-            writer.write(connections[topic], ns, theirs.serialize_ros1(message, type_name))
+            writer.write(connections[topic], ns, as_ros1(type_name, raw))
     return path
 
 

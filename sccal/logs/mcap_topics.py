@@ -328,6 +328,6 @@ def _collected(
 
 
 def seconds_of(ns: Ints) -> Floats:
-    """The nearest numbers of seconds (n) to nanoseconds (n); dividing at once would round twice, and shift stamps of one time apart."""
+    """Seconds (n), rounded once. Dividing at once would round twice and shift equal stamps apart."""
     seconds: Floats = ns // 1_000_000_000 + (ns % 1_000_000_000) / 1e9
     return seconds

@@ -34,12 +34,14 @@ from tests.message_logs import (
     Message,
     as_json,
     as_protobuf,
+    as_ros1,
     cdr,
     fill,
     json_bytes,
     messages_of,
     proto_classes,
     read_bytes,
+    ros1_definition,
     ros2_bytes,
     stamp,
     write_db3,
@@ -589,6 +591,35 @@ def test_further_numbers_are_columns(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.wheels.extras["payload_kg"], 0.5 * np.arange(ROWS))
     np.testing.assert_allclose(run.wheels.extras["battery.voltage"][:-1], 25 - 0.01 * np.arange(ROWS - 1), rtol=1e-6)
     assert "battery.current" in run.wheels.extras
+
+
+def test_several_channels_of_one_topic_are_one_topic(tmp_path: Path) -> None:
+    log = joints() + imus() + fixes()
+    mixed = [
+        (topic, kind if i % 3 else kind.replace("/msg", ""), ns, raw) for i, (topic, kind, ns, raw) in enumerate(log)
+    ]
+    run = read_bytes(tmp_path, ros2_bytes(mixed))
+    np.testing.assert_allclose(run.wheels.left_rad, LEFT)
+    np.testing.assert_allclose(np.unwrap(run.heading.yaw_rad), YAW)
+    assert run.fixes.lat_deg.size == ROWS
+
+
+def test_ros1_messages_in_mcap(tmp_path: Path) -> None:
+    file = io.BytesIO()
+    writer = Writer(file)
+    writer.start(profile="ros1")
+    channels: dict[str, int] = {}
+    for topic, kind, ns, raw in joints() + imus() + fixes():
+        if topic not in channels:
+            text = ros1_definition(kind).encode()
+            schema = writer.register_schema(kind.replace("/msg", ""), "ros1msg", text)
+            channels[topic] = writer.register_channel(topic, "ros1", schema)
+        writer.add_message(channels[topic], ns, as_ros1(kind, raw), ns)
+    writer.finish()
+    run = read_bytes(tmp_path, file.getvalue())
+    np.testing.assert_allclose(run.wheels.t_s, T, atol=1e-9)
+    np.testing.assert_allclose(run.wheels.right_rad, RIGHT)
+    assert run.fixes.quality.tolist() == [4] * ROWS
 
 
 def test_old_and_short_type_names(tmp_path: Path) -> None:
