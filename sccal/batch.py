@@ -21,6 +21,7 @@ from sccal.experiments.result import Experiments
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import find_start
+from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, find_runs, read_run
 from sccal.logs.streams import Vehicle
 from sccal.report.diagnosis_write import write_diagnosis
@@ -43,10 +44,11 @@ def calibrate_paths(
     out: Path,
     options: CalibrationOptions,
     tell: Callable[[RunSource, Calibration | SccalError], None],
+    read: ReadOptions | None = None,
 ) -> Batch:
     """Calibrate every run below the paths, write what each gives to out/<run>, then the vehicles to out.
 
-    ``tell`` is called after each run, with its result or with why there is none.
+    ``tell`` is called after each run, with its result or with why there is none; ``read`` is for logs of messages.
     """
     sources, failures = find_runs(paths)
     batch = Batch(failures=failures)
@@ -57,7 +59,7 @@ def calibrate_paths(
     of_vehicle: dict[tuple[object, ...], list[tuple[Calibration, RunProblem]]] = {}
     for source in sources:
         try:
-            calibration, problem = calibrate_run(read_run(source), options)
+            calibration, problem = calibrate_run(read_run(source, read), options)
             if options.effects:
                 calibration = with_honest_effects(calibration, problem)
             write_calibration(calibration, out / source.name)
@@ -84,7 +86,7 @@ def calibrate_paths(
 
 
 def diagnose_paths(
-    paths: Sequence[Path], out: Path, options: CalibrationOptions
+    paths: Sequence[Path], out: Path, options: CalibrationOptions, read: ReadOptions | None = None
 ) -> tuple[list[tuple[Diagnosis, Path]], list[Failure]]:
     """Diagnose every vehicle below the paths, all its runs together, and write what is found to out.
 
@@ -98,7 +100,7 @@ def diagnose_paths(
     of_vehicle: dict[tuple[object, ...], list[Aligned]] = {}
     for source in sources:
         try:
-            aligned = align(read_run(source))
+            aligned = align(read_run(source, read))
             find_start(aligned)
         except Exception as error:
             failures.append(Failure(source.name, as_known(error)))

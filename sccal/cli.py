@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,6 +19,7 @@ from sccal.errors import Exit, Failure, SccalError, UsageError
 if TYPE_CHECKING:
     from sccal.calibration.result import Calibration
     from sccal.degrade.folder import DegradedRun
+    from sccal.logs.options import ReadOptions
     from sccal.logs.run import RunSource
 
 app = typer.Typer(
@@ -27,6 +30,25 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+READ_OPTIONS = {
+    "wheels_topic": "Topic of the wheels, where several could be.",
+    "heading_topic": "Topic of the heading, where several could be.",
+    "fix_topic": "Topic of the fixes, where several could be.",
+    "left_joint": "Joint of the left wheel, where the names do not say.",
+    "right_joint": "Joint of the right wheel.",
+    "left_ticks": "Field with the left wheel's ticks, as TOPIC:path, of any message.",
+    "right_ticks": "Field with the right wheel's ticks.",
+    "left_rad": "Field with the left wheel's angle, instead.",
+    "right_rad": "Field with the right wheel's angle, instead.",
+    "yaw": "Field with the heading: radians, or degrees where its name ends in deg.",
+    "latitude": "Field with the latitude of the fixes, degrees.",
+    "longitude": "Field with the longitude of the fixes, degrees.",
+    "time": "Time of messages: header (their own stamp, where not zero), log or publish.",
+    "orientation": "Quaternions in messages: enu (as ROS asks) or ned.",
+}
+"""How logs of messages (.mcap, .db3, .bag) are read: the fields of ReadOptions, with their help."""
+_READ_CHOICES = {"time": ("header", "log", "publish"), "orientation": ("enu", "ned")}
 
 Paths = Annotated[list[Path], typer.Argument(help="Runs, or folders of runs at any depth.", show_default=False)]
 
@@ -50,6 +72,38 @@ def main() -> None:
         sys.exit(int(Exit.INTERNAL))
 
 
+def _with_read_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The command with an option for each field of ReadOptions, which it gets together as ``read``."""
+
+    @functools.wraps(command)
+    def with_options(**given: Any) -> None:
+        from sccal.logs.options import ReadOptions
+
+        chosen = {name: given.pop(name).strip() for name in READ_OPTIONS}
+        for name, choices in _READ_CHOICES.items():
+            if chosen[name] not in choices:
+                raise UsageError(f"--{name} {chosen[name]}: must be {', '.join(choices[:-1])} or {choices[-1]}")
+        command(**given, read=ReadOptions(**chosen))
+
+    command.__annotations__["read"] = object  # its module is heavy, and typer never sees it
+    own = inspect.signature(command, eval_str=True)
+    kept = [parameter for name, parameter in own.parameters.items() if name != "read"]
+    added = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=_READ_CHOICES.get(name, ("",))[0],
+            annotation=Annotated[str, typer.Option(help=text, show_default=name in _READ_CHOICES)],
+        )
+        for name, text in READ_OPTIONS.items()
+    ]
+    parameters = [*kept, *added]
+    del with_options.__wrapped__
+    with_options.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    with_options.__annotations__ = {one.name: one.annotation for one in parameters}
+    return with_options
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         print(f"sccal {__version__}")
@@ -66,6 +120,7 @@ def _options(
 
 
 @app.command()
+@_with_read_options
 def calibrate(
     paths: Paths,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
@@ -93,8 +148,13 @@ def calibrate(
         list[str] | None,
         typer.Option(help="Withhold the fixes from 60 to 120 s, say, and tell how far the robot drifts (repeatable)."),
     ] = None,
+    *,
+    read: ReadOptions,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
+    from sccal.logs.mcap_magic import require_any_mcap
+
+    require_any_mcap(paths)
     import numpy as np
 
     from sccal.batch import calibrate_paths
@@ -120,7 +180,7 @@ def calibrate(
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
         withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
-    batch = calibrate_paths(paths, out, options, _tell)
+    batch = calibrate_paths(paths, out, options, _tell, read)
     width = _width()
     for vehicle, file in batch.vehicles:
         print()
@@ -158,19 +218,25 @@ def _tell(source: RunSource, result: Calibration | SccalError) -> None:
 
 
 @app.command()
+@_with_read_options
 def diagnose(
     paths: Paths,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
     window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0,
     heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0,
+    *,
+    read: ReadOptions,
 ) -> None:
     """What the model lacks in the runs below PATHS: name it, add it, and judge before and after on data held out."""
+    from sccal.logs.mcap_magic import require_any_mcap
+
+    require_any_mcap(paths)
     from sccal.batch import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.report.diagnosis_text import diagnosis_text
 
     options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
-    diagnosed, failures = diagnose_paths(paths, out, options)
+    diagnosed, failures = diagnose_paths(paths, out, options, read)
     width = _width()
     for diagnosis, page in diagnosed:
         print(diagnosis_text(diagnosis, width), end="")

@@ -162,7 +162,10 @@ def _check_turning(aligned: Aligned) -> None:
         "left and right wheels look swapped: exchange left_ticks and right_ticks in encoder.csv (or, if both count "
         "backwards, negate both)"
     )
-    mirrored = f'set convention = "{other}" under [ahrs] in vehicle.toml (it is "{convention}")'
+    mirrored = (
+        f'set convention = "{other}" under [ahrs] in vehicle.toml (it is "{convention}"), '
+        "or, for quaternions in messages, give --orientation ned"
+    )
     if aligned.heading_convention is not None:
         mirrored = f"the headings of {aligned.heading_source} do not turn clockwise from north: write an ahrs.csv"
     if wheels_fit is False and yaw_fits is not False:

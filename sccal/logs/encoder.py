@@ -26,7 +26,15 @@ def read_encoder(path: Path, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notic
     Raises:
         DataError: unreadable file, ticks without ``ticks_per_rev``, or counts that no motion explains.
     """
-    table = read_table(path, (_TICKS, _ANGLES))
+    return repaired_wheels(read_table(path, (_TICKS, _ANGLES)), str(path), vehicle)
+
+
+def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notice, ...]]:
+    """Unwrap and repair a table with ``left_ticks,right_ticks`` or ``left_rad,right_rad``; ``path`` is for messages.
+
+    Raises:
+        DataError: ticks without ``ticks_per_rev``, or counts that no motion explains.
+    """
     in_ticks = set(_TICKS) <= table.columns.keys()
     if in_ticks and vehicle.ticks_per_rev is None:
         raise DataError(

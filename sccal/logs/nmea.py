@@ -55,7 +55,7 @@ def read_nmea_heading(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
     return parse_nmea_heading(_bytes_of(path), path.name, path)
 
 
-def parse_nmea(raw: bytes, source: str, path: Path | None = None) -> tuple[FixStream, tuple[Notice, ...]]:
+def parse_nmea(raw: bytes, source: str, path: Path | str | None = None) -> tuple[FixStream, tuple[Notice, ...]]:
     """The fixes in the bytes of an NMEA log; notices name it ``source``, errors ``path`` where there is one.
 
     Raises:
@@ -70,7 +70,9 @@ def parse_nmea(raw: bytes, source: str, path: Path | None = None) -> tuple[FixSt
     return fixes, tuple(notices)
 
 
-def parse_nmea_heading(raw: bytes, source: str, path: Path | None = None) -> tuple[HeadingStream, tuple[Notice, ...]]:
+def parse_nmea_heading(
+    raw: bytes, source: str, path: Path | str | None = None
+) -> tuple[HeadingStream, tuple[Notice, ...]]:
     """The headings in the bytes of an NMEA log, of the kind that says most about its quality.
 
     Notices that the fixes of the same bytes give too are left out.

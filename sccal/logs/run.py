@@ -1,4 +1,4 @@
-"""Runs in folders: finding them, and reading one into its streams."""
+"""Runs: finding them in folders, and reading one into its streams. A file of messages is a run on its own."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ from pathlib import Path
 
 from sccal.errors import DataError, Failure, UsageError
 from sccal.logs.ahrs import read_ahrs
+from sccal.logs.bags import bag_folder_files
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
+from sccal.logs.mcap_run import MESSAGE_SUFFIXES, read_message_log
 from sccal.logs.nmea import read_nmea, read_nmea_heading
+from sccal.logs.options import ReadOptions
 from sccal.logs.reference import read_reference
 from sccal.logs.streams import HeadingStream, Notice, Run
 from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
@@ -29,6 +32,7 @@ class RunSource:
     name: str
     """Unique within one call; may hold '/'."""
     path: Path
+    """A folder, or a file of messages."""
     vehicle_toml: Path | None
     """The vehicle.toml that applies: the run's own or the nearest parent's, up to the path given."""
     searched_up_to: Path | None = None
@@ -48,12 +52,16 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     seen: set[Path] = set()
     for path in paths:
         root = _root(path)
+        places = [path] if _is_message_file(path) else _run_places(root)
         sources = [
-            RunSource(_name_below(root, folder), folder, _nearest_vehicle(folder, root), root)
-            for folder in sorted(_run_folders(root), key=lambda folder: _natural(folder.relative_to(root)))
+            RunSource(_name_below(root, place), place, _nearest_vehicle(_folder_of(place), root), root)
+            for place in sorted(places, key=lambda place: _natural(place.relative_to(root)))
         ]
         if not sources:
-            raise DataError(f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}")
+            raise DataError(
+                f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}, "
+                f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own"
+            )
         found += [source for source in sources if source.path.resolve() not in seen]
         seen |= {source.path.resolve() for source in sources}
     return _with_unique_names(found)
@@ -76,12 +84,16 @@ def find_runs(paths: Sequence[Path]) -> tuple[list[RunSource], list[Failure]]:
     return (discover(fruitful) if fruitful else []), failures
 
 
-def read_run(source: RunSource) -> Run:
+def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     """Read a run's vehicle, wheels, heading and fixes, with the notices of all readers.
+
+    ``options`` are for logs of messages.
 
     Raises:
         DataError: a file is missing or cannot be used.
     """
+    if _is_message_file(source.path) or _is_bag_folder(source.path):
+        return _read_message_run(source, options or ReadOptions())
     there = [name for name in RUN_FILES if (source.path / name).is_file()]
     missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
     if missing == ["ahrs.csv"] and "gnss.nmea" in there:
@@ -92,12 +104,7 @@ def read_run(source: RunSource) -> Run:
         raise DataError(
             f"{source.path}: lacks {', '.join(missing)}; found {', '.join(there) or 'none of the run files'}"
         )
-    if source.vehicle_toml is None:
-        raise DataError(
-            f"{source.path}: no vehicle.toml here or above, up to {source.searched_up_to or source.path}; "
-            f"add one with {MINIMAL_VEHICLE}"
-        )
-    vehicle, notices = read_vehicle(source.vehicle_toml)
+    vehicle, notices = read_vehicle(_vehicle_toml(source))
     wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)
     _require_rows(source.path / "encoder.csv", wheels.t_s.size, wheel_notices)
     heading, heading_notices = _read_heading(source.path, there)
@@ -134,7 +141,24 @@ def _read_heading(folder: Path, there: Sequence[str]) -> tuple[HeadingStream, tu
         ) from error
 
 
-def _require_rows(path: Path, usable: int, notices: Sequence[Notice]) -> None:
+def _read_message_run(source: RunSource, options: ReadOptions) -> Run:
+    vehicle, notices = read_vehicle(_vehicle_toml(source))
+    wheels, heading, fixes, found = read_message_log(source.path, vehicle, options)
+    for what, count in (("wheels", wheels.t_s), ("heading", heading.t_s), ("fixes", fixes.lat_deg)):
+        _require_rows(f"{source.path} ({what})", count.size, found)
+    return Run(source.name, source.path, vehicle, wheels, heading, fixes, (*notices, *found))
+
+
+def _vehicle_toml(source: RunSource) -> Path:
+    if source.vehicle_toml is None:
+        raise DataError(
+            f"{source.path}: no vehicle.toml here or above, up to {source.searched_up_to or source.path}; "
+            f"add one with {MINIMAL_VEHICLE}"
+        )
+    return source.vehicle_toml
+
+
+def _require_rows(path: Path | str, usable: int, notices: Sequence[Notice]) -> None:
     if usable < _FEWEST_ROWS:
         why = "; ".join(f"{notice.count} {notice.what}" for notice in notices) or "the file holds no more"
         raise DataError(f"{path}: {usable} usable rows, at least {_FEWEST_ROWS} are needed: {why}")
@@ -145,12 +169,32 @@ def _root(path: Path) -> Path:
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir():
         return path
-    if path.name in (*RUN_FILES, "vehicle.toml"):
+    if path.name in (*RUN_FILES, "vehicle.toml") or _is_message_file(path):
         return path.parent
-    raise DataError(f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}")
+    raise DataError(
+        f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
+        f"or a file {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)}"
+    )
 
 
-def _run_folders(root: Path) -> Iterator[Path]:
+def _is_message_file(path: Path) -> bool:
+    return path.suffix.lower() in MESSAGE_SUFFIXES and path.is_file()
+
+
+def _is_bag_folder(path: Path) -> bool:
+    return (
+        path.is_dir()
+        and not any((path / name).is_file() for name in RUN_FILES)
+        and bag_folder_files([file.name for file in path.iterdir()])
+    )
+
+
+def _folder_of(place: Path) -> Path:
+    return place if place.is_dir() else place.parent
+
+
+def _run_places(root: Path) -> Iterator[Path]:
+    """Folders and files that are runs."""
     visited: set[str] = set()
     for folder, below, files in os.walk(root, followlinks=True):
         real = os.path.realpath(folder)
@@ -161,8 +205,13 @@ def _run_folders(root: Path) -> Iterator[Path]:
         below[:] = sorted(name for name in below if not name.startswith("."))
         if "calibration.json" in files and "encoder.csv" not in files:
             continue
-        if any(name in files for name in RUN_FILES):
+        if any(name in files for name in RUN_FILES) or bag_folder_files(files):
             yield Path(folder)
+        bag = bag_folder_files(files)
+        for name in files:
+            suffix = Path(name).suffix.lower()
+            if suffix in MESSAGE_SUFFIXES and not name.startswith(".") and not (bag and suffix == ".db3"):
+                yield Path(folder) / name
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
@@ -178,8 +227,10 @@ def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
         folder = folder.parent
 
 
-def _name_below(root: Path, folder: Path) -> str:
-    relative = folder.relative_to(root).as_posix()
+def _name_below(root: Path, place: Path) -> str:
+    relative = place.relative_to(root).as_posix()
+    if place.is_file():
+        return relative[: -len(place.suffix)]
     return relative if relative != "." else root.resolve().name or "run"
 
 
@@ -192,14 +243,18 @@ def _natural(path: Path) -> list[list[tuple[int, int, str]]]:
 
 
 def _with_unique_names(sources: list[RunSource]) -> list[RunSource]:
-    names = [source.name for source in sources]
+    roots: dict[str, set[Path | None]] = {}
+    for source in sources:
+        roots.setdefault(source.name, set()).add(source.searched_up_to)
     taken: set[str] = set()
     unique = []
     for source in sources:
         name = source.name
-        if names.count(name) > 1:
+        if len(roots[name]) > 1:
             root = source.searched_up_to or source.path
             name = f"{root.resolve().name}/{name}" if root.resolve().name and source.path != root else name
+        if name in taken and source.path.is_file():
+            name += source.path.suffix
         candidate, number = name, 2
         while candidate in taken:
             candidate, number = f"{name}-{number}", number + 1

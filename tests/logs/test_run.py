@@ -91,11 +91,18 @@ def test_a_file_of_a_run_stands_for_its_folder(tmp_path: Path) -> None:
     assert names(folder / "encoder.csv") == ["run"]
 
 
-@pytest.mark.parametrize("name", ["log.mcap", "notes.txt"])
-def test_other_files_are_no_run_folders(tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_text("")
+def test_other_files_are_no_run_folders(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("")
     with pytest.raises(DataError, match="is not a run folder"):
-        discover([tmp_path / name])
+        discover([tmp_path / "notes.txt"])
+
+
+def test_a_folder_and_a_file_of_one_name_are_two_runs(tmp_path: Path) -> None:
+    make_run(tmp_path / "logs" / "run")
+    (tmp_path / "logs" / "run.mcap").write_bytes(b"")
+    assert names(tmp_path / "logs") == ["run", "run.mcap"]
+    make_run(tmp_path / "others" / "run")
+    assert names(tmp_path / "logs", tmp_path / "others") == ["logs/run", "logs/run.mcap", "others/run"]
 
 
 def test_no_such_path_and_no_run(tmp_path: Path) -> None:

@@ -1,0 +1,104 @@
+"""Fixes out of messages: NavSatFix, GPSFix, LocationFix, NMEA sentences, or latitude and longitude at any path.
+
+NavSatStatus says less than GGA: −1 no fix, 0 a fix, 1 with satellite corrections, 2 with corrections from the ground.
+Drivers give 2 for RTK, fixed or float. So status 0 is quality 1, 1 is 2, and 2 is 4 (RTK fixed) unless the covariance
+states more than RTK_FIXED_M, then 5 (float). A type without status is −1, not stated.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sccal.arrays import Bools, Floats, Ints
+from sccal.errors import DataError
+from sccal.logs.mcap_topics import Messages
+from sccal.logs.mcap_wheels import of_messages
+from sccal.logs.nmea import parse_nmea
+from sccal.logs.streams import FixStream, Notice
+from sccal.logs.timeline import order_in_time
+
+RTK_FIXED_M = 0.1
+"""Between the 0.01 to 0.03 m that receivers state for RTK fixed and the 0.2 m and more for float."""
+
+
+def quality_of(status: Floats, sigma_m: Floats) -> Ints:
+    """GGA quality (n) for NavSatStatus or GPSStatus (n, NaN where there is none) and the stated sigma (n, m)."""
+    quality = np.full(status.size, -1, dtype=np.int64)
+    quality[status < 0] = 0
+    quality[status == 0] = 1
+    quality[(status == 1) | (status > 2)] = 2
+    quality[status == 2] = 4
+    quality[(status == 2) & (sigma_m > RTK_FIXED_M)] = 5
+    return quality
+
+
+def fixes_of_positions(messages: Messages, path: str, source: str) -> tuple[FixStream, tuple[Notice, ...]]:
+    """Fixes of a topic with latitude and longitude in degrees.
+
+    Raises:
+        DataError: no message holds a usable position.
+    """
+    lat, lon = messages.column("latitude"), messages.column("longitude")
+    none = messages.column("status") < 0
+    unset = ~none & ~(np.isfinite(lat) & np.isfinite(lon))
+    beyond = ~none & ~unset & ((np.abs(lat) > 90) | (np.abs(lon) > 360))
+    origin = ~none & (lat == 0) & (lon == 0)
+    notices = []
+    for rows, what in (
+        (none, "messages without a fix (status −1) dropped"),
+        (unset, "messages without a position dropped"),
+        (beyond, "messages with a latitude beyond 90 or a longitude beyond 360 degrees dropped"),
+        (origin, "messages at latitude 0, longitude 0 dropped"),
+    ):
+        if rows.any():
+            notices.append(Notice(source, what, int(rows.sum()), f"message {messages.number[rows][0]}"))
+    keep: Bools = ~(none | unset | beyond | origin)
+    if not keep.any():
+        why = "; ".join(str(notice) for notice in notices)
+        raise DataError(f"{path}: none of {lat.size} messages holds a usable position: {why}")
+    messages = messages.keep(keep)
+    order, order_notices = order_in_time(messages.t_s, messages.number, source)
+    messages = messages.take(order)
+    n = messages.t_s.size
+    var_east, var_north = messages.column("cov_ee"), messages.column("cov_nn")
+    stated = (var_east > 0) & (var_north > 0) & (messages.column("cov_type") != 0)
+    sigma_east, sigma_north = (np.sqrt(np.where(stated, v, np.nan)) for v in (var_east, var_north))
+    stream = FixStream(
+        host_t_s=messages.t_s,
+        utc_s=np.full(n, np.nan),
+        utc_has_date=False,
+        lat_deg=messages.column("latitude"),
+        lon_deg=_wrapped_longitude(messages.column("longitude")),
+        alt_m=messages.column("altitude"),
+        quality=quality_of(messages.column("status"), np.maximum(sigma_east, sigma_north)),
+        sigma_east_m=sigma_east,
+        sigma_north_m=sigma_north,
+        cov_en_m2=np.where(stated, np.nan_to_num(messages.column("cov_en")), 0.0),
+    )
+    return stream, of_messages((*notices, *order_notices))
+
+
+def fixes_of_sentences(messages: Messages, path: str, source: str) -> tuple[FixStream, tuple[Notice, ...]]:
+    """Fixes of a topic of NMEA sentences; the messages' times are the receive times.
+
+    Raises:
+        DataError: no sentence, or no fix.
+    """
+    lines = (
+        b"%.7f %s\n" % (t, b" ".join(text.split()))
+        for t, text in zip(messages.t_s.tolist(), messages.texts, strict=True)
+    )
+    stream, notices = parse_nmea(b"".join(lines), source, path)
+    return stream, of_messages(notices)
+
+
+_POSITIONS = (b"GGA,", b"RMC,", b"GNS,", b"GGK,", b"KSXT,")
+
+
+def has_positions(messages: Messages) -> bool:
+    """Whether a topic of sentences holds any that give a position."""
+    return any(name in text for text in messages.texts for name in _POSITIONS)
+
+
+def _wrapped_longitude(lon_deg: Floats) -> Floats:
+    return np.where(np.abs(lon_deg) > 180, (lon_deg + 180) % 360 - 180, lon_deg)

@@ -1,0 +1,291 @@
+"""A run out of a log of messages: which topics are its wheels, heading and fixes, and which are further columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from sccal.arrays import Floats
+from sccal.errors import DataError, UsageError
+from sccal.logs.bags import BAG_SUFFIXES, read_bag
+from sccal.logs.mcap_file import read_mcap
+from sccal.logs.mcap_fixes import fixes_of_positions, fixes_of_sentences, has_positions
+from sccal.logs.mcap_heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
+from sccal.logs.mcap_topics import FIELDS, Messages, Topics
+from sccal.logs.mcap_wheels import (
+    joint_names,
+    joints_of,
+    wheels_of_joints,
+    wheels_of_odometry,
+    wheels_of_paths,
+    with_series,
+)
+from sccal.logs.options import ReadOptions
+from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
+
+MESSAGE_SUFFIXES = (".mcap", *BAG_SUFFIXES)
+"""Files that are runs on their own."""
+_PATH_OPTIONS = ("left_ticks", "right_ticks", "left_rad", "right_rad", "yaw", "latitude", "longitude")
+_LISTED = 40
+
+
+@dataclass(frozen=True)
+class _Log:
+    """A log read, before anything is chosen."""
+
+    path: Path
+    options: ReadOptions
+    vehicle: Vehicle
+    seen: Mapping[str, str]
+    """Type by topic."""
+    found: Mapping[str, Messages]
+
+    def where(self, topic: str) -> str:
+        """The topic as errors name it."""
+        return f"{self.path} {topic}"
+
+    def source(self, topic: str) -> str:
+        """The topic as notices name it."""
+        return f"{self.path.name} {topic}"
+
+    def messages(self, topic: str) -> Messages | None:
+        """A topic's messages; the first slash of its name may be left out."""
+        return next((m for name, m in self.found.items() if name.lstrip("/") == topic.lstrip("/")), None)
+
+    def listed(self) -> str:
+        """All topics with their types."""
+        topics = [f"{topic} ({kind})" for topic, kind in sorted(self.seen.items())]
+        more = f" and {len(topics) - _LISTED} more" if len(topics) > _LISTED else ""
+        return (", ".join(topics[:_LISTED]) + more) or "none"
+
+
+def read_message_log(
+    path: Path, vehicle: Vehicle, options: ReadOptions
+) -> tuple[WheelStream, HeadingStream, FixStream, tuple[Notice, ...]]:
+    """The streams of an .mcap, .db3 or .bag file, or of a rosbag2 folder.
+
+    Raises:
+        DataError: the file cannot be read, or lacks a stream, or holds several and nothing says which.
+        UsageError: an option that is no ``TOPIC:path``, or half of a pair.
+    """
+    asked = _asked_paths(options)
+    topics = Topics(asked)
+    notices = (read_mcap if path.suffix.lower() == ".mcap" else read_bag)(path, topics.open)
+    found, unread = topics.messages(path.name, options.time)
+    log = _Log(path, options, vehicle, topics.seen, found)
+    if not topics.seen:
+        why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
+        raise DataError(f"{path}: no message can be read: {why}")
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # whatever numbers broken bytes hold
+            wheels, wheel_notices, wheel_topics = _wheels(log)
+            heading, heading_notices, heading_topics = _heading(log)
+            fixes, fix_notices, fix_topics = _fixes(log)
+    except DataError as error:
+        lost = "; ".join(str(notice) for notice in (*notices, *unread))
+        raise DataError(f"{error} ({lost})") if lost else error from None
+    _require_common_time(log, wheel_topics[0], heading_topics[0], fix_topics[0])
+    wheels = with_series(wheels, _further_columns(found))
+    return wheels, heading, fixes, (*notices, *unread, *wheel_notices, *heading_notices, *fix_notices)
+
+
+def _asked_paths(options: ReadOptions) -> dict[str, list[str]]:
+    asked: dict[str, list[str]] = {}
+    for name in _PATH_OPTIONS:
+        value = getattr(options, name)
+        if value:
+            topic, path = _split(name, value)
+            asked.setdefault(topic.lstrip("/"), []).append(path)
+    for pair in (("left_ticks", "right_ticks"), ("left_rad", "right_rad"), ("latitude", "longitude")):
+        given = [name for name in pair if getattr(options, name)]
+        if len(given) == 1:
+            missing = pair[1] if given[0] == pair[0] else pair[0]
+            raise UsageError(f"{_option(given[0])} needs {_option(missing)} beside it")
+    if options.left_ticks and options.left_rad:
+        raise UsageError("--left-ticks and --left-rad name the same wheel; give one of them")
+    return asked
+
+
+def _split(name: str, value: str) -> tuple[str, str]:
+    topic, _, path = value.rpartition(":")
+    if not topic or not path:
+        raise UsageError(f"{_option(name)} {value}: must be TOPIC:path, such as /wheels/left:ticks")
+    return topic, path
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
+def _asked_column(log: _Log, name: str) -> tuple[Messages, str]:
+    """The messages and column that an option names."""
+    topic, path = _split(name, getattr(log.options, name))
+    messages = log.messages(topic)
+    if messages is None:
+        raise DataError(f"{log.path}: {_option(name)}: no messages on {topic}; the log has {log.listed()}")
+    if f":{path}" not in messages.values:
+        there = ", ".join(sorted(name[1:] for name in messages.values if name.startswith("+")))
+        more = f"; its further numbers are {there}" if there else ""
+        raise DataError(f"{log.path}: {_option(name)}: no number {path} in {topic} ({messages.type_name}){more}")
+    return messages, f":{path}"
+
+
+def _chosen(
+    log: _Log, what: str, option: str, asked: str, ranks: Sequence[tuple[str, Callable[[Messages], bool]]], instead: str
+) -> tuple[Messages, tuple[Notice, ...]]:
+    """The topic asked for, else the only usable one of the first kind that has any.
+
+    Raises DataError with the candidates, and the option that chooses among them.
+    """
+    if asked:
+        messages = log.messages(asked)
+        if messages is None:
+            raise DataError(f"{log.path}: {option} {asked}: no such topic with messages; the log has {log.listed()}")
+        if messages.kind not in [kind for kind, _ in ranks]:
+            kinds = ", ".join(kind for kind, _ in ranks)
+            raise DataError(
+                f"{log.path}: {option} {asked} is a {messages.type_name}, from which no {what} can be read ({kinds}); "
+                f"name its field with {instead}"
+            )
+        return messages, ()
+    candidates: list[Messages] = []
+    for kind, usable in ranks:
+        of_kind = [m for m in log.found.values() if m.kind == kind and usable(m)]
+        if len(of_kind) > 1 and not candidates:
+            names = ", ".join(f"{m.topic} ({m.type_name}, {m.t_s.size} messages)" for m in of_kind)
+            raise DataError(f"{log.path}: {len(of_kind)} topics may be the {what}: {names}; choose one with {option}")
+        candidates += of_kind
+    if not candidates:
+        kinds = ", ".join(kind for kind, _ in ranks)
+        raise DataError(
+            f"{log.path}: no topic holds the {what} ({kinds}); the log has {log.listed()}; name a field with {instead}"
+        )
+    others = ", ".join(m.topic for m in candidates[1:])
+    source = log.source(candidates[0].topic)
+    tell = (Notice(source, f"other topics for the {what} not read: {others}; {option} chooses", len(candidates) - 1),)
+    return candidates[0], tell if others else ()
+
+
+def _always(_: Messages) -> bool:
+    return True
+
+
+def _wheels(log: _Log) -> tuple[WheelStream, tuple[Notice, ...], tuple[str, ...]]:
+    options = log.options
+    for unit in ("ticks", "rad"):
+        if getattr(options, f"left_{unit}"):
+            left, right = (_asked_column(log, f"{side}_{unit}") for side in ("left", "right"))
+            topic = left[0].topic
+            stream, notices = wheels_of_paths(left, right, unit, log.vehicle, log.where(topic), log.source(topic))
+            return stream, notices, (topic, right[0].topic)
+    joints = [m for m in log.found.values() if m.kind == "JointState"]
+    ranks = [("JointState", lambda m: joints_of(m, options) is not None), ("Odometry", _always)]
+    instead = "--left-ticks TOPIC:path and --right-ticks TOPIC:path"
+    if joints and not options.wheels_topic and not any(joints_of(m, options) for m in joints):
+        names = "; ".join(f"{m.topic} has {', '.join(joint_names(m)[:20])}" for m in joints)
+        asked = f"joints {options.left_joint or 'left'}, {options.right_joint or 'right'}"
+        raise DataError(
+            f"{log.path}: no joint state names one left and one right wheel ({asked}): {names}; "
+            "choose with --left-joint and --right-joint"
+        )
+    messages, tell = _chosen(log, "wheels", "--wheels-topic", options.wheels_topic, ranks, instead)
+    where, source = log.where(messages.topic), log.source(messages.topic)
+    if messages.kind == "Odometry":
+        stream, notices = wheels_of_odometry(messages, log.vehicle, where, source)
+    else:
+        names_there = joints_of(messages, options)
+        if names_there is None:
+            raise DataError(
+                f"{where}: its joints are {', '.join(joint_names(messages)[:20])}; "
+                "choose the wheels' with --left-joint and --right-joint"
+            )
+        stream, notices = wheels_of_joints(messages, names_there, log.vehicle, where, source)
+    return stream, (*tell, *notices), (messages.topic,)
+
+
+def _heading(log: _Log) -> tuple[HeadingStream, tuple[Notice, ...], tuple[str, ...]]:
+    options = log.options
+    if options.yaw:
+        messages, name = _asked_column(log, "yaw")
+        stream, notices = heading_of_path(
+            messages, name, log.vehicle, log.where(messages.topic), log.source(messages.topic)
+        )
+        return stream, notices, (messages.topic,)
+
+    def oriented(messages: Messages) -> bool:
+        return bool(has_orientation(messages).any())
+
+    ranks = [("Imu", oriented), ("QuaternionStamped", oriented), ("MagneticField", _always)]
+    messages, tell = _chosen(log, "heading", "--heading-topic", options.heading_topic, ranks, "--yaw TOPIC:path")
+    where, source = log.where(messages.topic), log.source(messages.topic)
+    if messages.kind == "MagneticField":
+        stream, notices = heading_of_field(messages, _levelling_imu(log), log.vehicle, where, source)
+    else:
+        stream, notices = heading_of_quaternions(messages, options.orientation, log.vehicle, where, source)
+    return stream, (*tell, *notices), (messages.topic,)
+
+
+def _levelling_imu(log: _Log) -> Messages | None:
+    """The IMU that says how the magnetometer stood: one with an orientation before one with accelerations only."""
+    imus = sorted((m for m in log.found.values() if m.kind == "Imu"), key=lambda m: m.topic)
+    return next((m for m in imus if has_orientation(m).any()), imus[0] if imus else None)
+
+
+def _fixes(log: _Log) -> tuple[FixStream, tuple[Notice, ...], tuple[str, ...]]:
+    options = log.options
+    if options.latitude:
+        (messages, lat), (other, lon) = _asked_column(log, "latitude"), _asked_column(log, "longitude")
+        if messages.topic != other.topic:
+            raise DataError(f"{log.path}: --latitude and --longitude must be fields of one topic")
+        values = {"latitude": messages.column(lat), "longitude": messages.column(lon)}
+        positions = replace(messages, values=values)
+        stream, notices = fixes_of_positions(positions, log.where(messages.topic), log.source(messages.topic))
+        return stream, notices, (messages.topic,)
+
+    def positions_in(messages: Messages) -> bool:
+        return bool(np.isfinite(messages.column("latitude")).any())
+
+    ranks = [
+        ("Sentence", has_positions),
+        ("NavSatFix", positions_in),
+        ("GPSFix", positions_in),
+        ("LocationFix", positions_in),
+    ]
+    instead = "--latitude TOPIC:path and --longitude TOPIC:path"
+    messages, tell = _chosen(log, "fixes", "--fix-topic", options.fix_topic, ranks, instead)
+    read = fixes_of_sentences if messages.kind == "Sentence" else fixes_of_positions
+    stream, notices = read(messages, log.where(messages.topic), log.source(messages.topic))
+    return stream, (*tell, *notices), (messages.topic,)
+
+
+def _require_common_time(log: _Log, *topics: str) -> None:
+    """Raise where the stamps of the streams share no time but their log times do: then the stamps' clocks differ."""
+    streams = [log.found[topic] for topic in topics]
+    if log.options.time == "log" or _overlap([m.t_s for m in streams]) or not _overlap([m.log_s for m in streams]):
+        return
+    spans = ", ".join(f"{m.topic} {m.t_s.min():.3f} … {m.t_s.max():.3f} s" for m in streams)
+    raise DataError(
+        f"{log.path}: the {log.options.time} times of the streams share no time: {spans}; their log times do: "
+        "give --time log"
+    )
+
+
+def _overlap(times: Sequence[Floats]) -> bool:
+    return bool(max(t.min() for t in times) <= min(t.max() for t in times))
+
+
+def _further_columns(found: Mapping[str, Messages]) -> dict[str, tuple[Floats, Floats]]:
+    """Numbers of topics that are no stream, as series by name: ``motor_current_a``, or ``battery.voltage``."""
+    series: dict[str, tuple[Floats, Floats]] = {}
+    for topic, messages in sorted(found.items()):
+        if messages.kind in FIELDS:
+            continue
+        stem = topic.strip("/").replace("/", ".")
+        names = [name for name in messages.values if name.startswith("+")]
+        for name in names:
+            alone = len(names) == 1 and name in ("+data", "+value")
+            series[stem if alone else f"{stem}.{name[1:]}"] = (messages.t_s, messages.values[name])
+    return series

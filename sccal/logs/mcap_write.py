@@ -1,0 +1,230 @@
+"""A run as an MCAP file in the ros2 profile: JointState, Imu, and NMEA sentences or NavSatFix, stamped as logged.
+
+All values are written as they were read, in double precision, so that the file calibrates as the run does. Messages of
+one topic have one layout: a blank message is encoded once, and numpy sets its numbers row by row.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sccal.arrays import Floats, Ints
+from sccal.errors import DataError
+from sccal.logs.mcap_definitions import full_text, known_definitions
+from sccal.logs.mcap_ros import RosWalker
+from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream
+
+LEFT_JOINT, RIGHT_JOINT = "left_wheel_joint", "right_wheel_joint"
+WHEELS_TOPIC, HEADING_TOPIC, FIX_TOPIC, NMEA_TOPIC = "/joint_states", "/imu/data", "/fix", "/nmea_sentence"
+_STATUS = {0: -1, 2: 1, 3: 1, 9: 1, 4: 2, 5: 2}
+"""NavSatStatus by GGA quality; 0, a fix, for all others."""
+_SENTENCE = re.compile(rb"^\s*([-+]?\d+(?:\.\d+)?)[\s,;]+(\$[^\r\n]*)", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """Encoded messages of one topic: n stamps (ns) and n CDR messages."""
+
+    topic: str
+    type_name: str
+    stamp_ns: Ints
+    messages: list[bytes]
+
+
+def write_mcap(run: Run, path: Path, nmea: bytes | None = None, compression: str = "zstd") -> None:
+    """Write a run; of ``nmea``, the bytes of its gnss.nmea, all sentences with a receive time, instead of its fixes.
+
+    Raises:
+        DataError: ``nmea`` holds no sentence with a receive time; times before 1970-01-01 (negative ones).
+    """
+    from mcap.writer import CompressionType, Writer
+
+    topics = [joint_states(run.wheels), imu(run.heading, run.vehicle.convention)]
+    topics.append(nav_sat_fixes(run.fixes) if nmea is None else sentences(nmea, path))
+    topics += _further(run)
+    if min(int(topic.stamp_ns.min()) for topic in topics if topic.stamp_ns.size) < 0:
+        raise DataError(f"{path}: the run has times below zero, which MCAP cannot hold")
+    kind = {"": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}[compression]
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            writer = Writer(file, compression=kind)
+            writer.start(profile="ros2", library="sccal")
+            channels = []
+            for topic in topics:
+                text = full_text(topic.type_name.replace("/msg/", "/")).encode()
+                schema = writer.register_schema(topic.type_name, "ros2msg", text)
+                channels.append(writer.register_channel(topic.topic, "cdr", schema))
+            for number, (ns, which, message) in enumerate(_in_order(topics)):
+                writer.add_message(channels[which], log_time=ns, publish_time=ns, data=message, sequence=number)
+            writer.finish()  # type: ignore[no-untyped-call]
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def joint_states(wheels: WheelStream) -> Stamped:
+    """The wheels' cumulative angles as positions of two joints."""
+    texts = {"header.frame_id": "base_link", "name[0]": LEFT_JOINT, "name[1]": RIGHT_JOINT}
+    numbers = {"position[0]": wheels.left_rad, "position[1]": wheels.right_rad}
+    return _encoded(WHEELS_TOPIC, "sensor_msgs/msg/JointState", wheels.t_s, texts, {"name": 2, "position": 2}, numbers)
+
+
+def imu(heading: HeadingStream, convention: str) -> Stamped:
+    """The heading as orientations in ROS's east, north, up; angles that the AHRS does not give are zero."""
+    yaw = heading.yaw_rad if convention == "enu" else 0.5 * np.pi - heading.yaw_rad
+    zero = np.zeros(yaw.size)
+    pitch = zero if heading.pitch_rad is None else -np.nan_to_num(heading.pitch_rad)
+    roll = zero if heading.roll_rad is None else np.nan_to_num(heading.roll_rad)
+    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a / 2), np.sin(a / 2)) for a in (yaw, pitch, roll))
+    numbers = {
+        "orientation.w": cr * cp * cy + sr * sp * sy,
+        "orientation.x": sr * cp * cy - cr * sp * sy,
+        "orientation.y": cr * sp * cy + sr * cp * sy,
+        "orientation.z": cr * cp * sy - sr * sp * cy,
+        "linear_acceleration_covariance[0]": zero - 1.0,
+    }
+    if heading.yaw_sigma_rad is not None:
+        variance = np.nan_to_num(heading.yaw_sigma_rad) ** 2
+        numbers |= {f"orientation_covariance[{i}]": variance for i in (0, 4, 8)}
+    if heading.gyro_z_radps is None:
+        numbers["angular_velocity_covariance[0]"] = zero - 1.0
+    else:
+        numbers["angular_velocity.z"] = heading.gyro_z_radps
+    return _encoded(HEADING_TOPIC, "sensor_msgs/msg/Imu", heading.t_s, {"header.frame_id": "base_link"}, {}, numbers)
+
+
+def nav_sat_fixes(fixes: FixStream) -> Stamped:
+    """The fixes, stamped with the receive time where there is one, else with the receiver's epoch."""
+    t_s = np.where(np.isfinite(fixes.host_t_s), fixes.host_t_s, fixes.utc_s)
+    stated = np.isfinite(fixes.sigma_east_m) & np.isfinite(fixes.sigma_north_m)
+    numbers = {
+        "status.status": np.array([_STATUS.get(code, 0) for code in fixes.quality.tolist()], dtype=np.float64),
+        "latitude": fixes.lat_deg,
+        "longitude": fixes.lon_deg,
+        "altitude": fixes.alt_m,
+        "position_covariance[0]": np.where(stated, fixes.sigma_east_m**2, 0.0),
+        "position_covariance[1]": np.where(stated, fixes.cov_en_m2, 0.0),
+        "position_covariance[3]": np.where(stated, fixes.cov_en_m2, 0.0),
+        "position_covariance[4]": np.where(stated, fixes.sigma_north_m**2, 0.0),
+        "position_covariance_type": np.where(stated, 3.0, 0.0),
+    }
+    return _encoded(FIX_TOPIC, "sensor_msgs/msg/NavSatFix", t_s, {"header.frame_id": "gnss"}, {}, numbers)
+
+
+def sentences(nmea: bytes, path: Path) -> Stamped:
+    """Every NMEA sentence with a receive time before it, stamped with that time.
+
+    Raises DataError where there is none: a message needs a time of its own.
+    """
+    found = [(float(stamp), text) for stamp, text in _SENTENCE.findall(nmea)]
+    if not found:
+        raise DataError(f"{path}: no NMEA sentence has a receive time before it; write the fixes instead")
+    stamp_ns = nanoseconds_of(np.array([t for t, _ in found]))
+    messages = []
+    for ns, (_, text) in zip(stamp_ns.tolist(), found, strict=True):
+        head = struct.pack("<4BiI", 0, 1, 0, 0, *divmod(ns, 1_000_000_000)) + struct.pack("<I5s", 5, b"gnss\0")
+        head += bytes(-(len(head) - 4) % 4)
+        messages.append(head + struct.pack("<I", len(text) + 1) + text + b"\0")
+    return Stamped(NMEA_TOPIC, "nmea_msgs/msg/Sentence", stamp_ns, messages)
+
+
+def _further(run: Run) -> Iterator[Stamped]:
+    """Further columns, each as a topic of numbers."""
+    for t_s, extras in ((run.wheels.t_s, run.wheels.extras), (run.heading.t_s, run.heading.extras)):
+        for name, column in extras.items():
+            rows = np.isfinite(column)
+            topic = "/" + re.sub(r"\W+", "_", name)
+            yield _encoded(topic, "std_msgs/msg/Float64", t_s[rows], {}, {}, {"data": column[rows]})
+
+
+def _encoded(
+    topic: str,
+    type_name: str,
+    t_s: Floats,
+    texts: Mapping[str, str],
+    counts: Mapping[str, int],
+    numbers: Mapping[str, Floats],
+) -> Stamped:
+    """Messages of one layout: ``texts`` by path, lengths of sequences by path, and columns (n) of numbers by path."""
+    root = type_name.replace("/msg/", "/")
+    blank = _Blank(texts, counts).encoded(root)
+    places = RosWalker(known_definitions(), root).shape(blank).numbers
+    stamp_ns = nanoseconds_of(t_s)
+    rows: NDArray[np.uint8] = np.tile(np.frombuffer(blank, dtype=np.uint8), (t_s.size, 1))
+    columns: dict[str, Floats | Ints] = dict(numbers)
+    if "header.stamp.sec" in places:
+        columns |= {"header.stamp.sec": stamp_ns // 1_000_000_000, "header.stamp.nanosec": stamp_ns % 1_000_000_000}
+    for name, column in columns.items():
+        place = places[name]
+        values = np.ascontiguousarray(column.astype(place.kind)).view(np.uint8).reshape(t_s.size, place.width)
+        rows[:, place.offset : place.offset + place.width] = values
+    return Stamped(topic, type_name, stamp_ns, [row.tobytes() for row in rows])
+
+
+class _Blank:
+    """One message with all numbers zero."""
+
+    def __init__(self, texts: Mapping[str, str], counts: Mapping[str, int]) -> None:
+        self.texts, self.counts = texts, counts
+        self.data = bytearray((0, 1, 0, 0))
+        self.definitions = known_definitions()
+
+    def encoded(self, name: str) -> bytes:
+        self._struct(name, "")
+        return bytes(self.data)
+
+    def _struct(self, name: str, path: str) -> None:
+        for one in self.definitions[name]:
+            where = f"{path}.{one.name}" if path else one.name
+            if one.count is None:
+                self._value(one.type, where)
+                continue
+            count = one.count
+            if count < 0:
+                count = self.counts.get(where, 0)
+                self._number(4, count)
+            for i in range(count):
+                self._value(one.type, f"{where}[{i}]")
+
+    def _value(self, kind: str, path: str) -> None:
+        bits = re.fullmatch(r"(?:u?int|float)(\d+)", kind)
+        if kind == "string":
+            text = self.texts.get(path, "").encode() + b"\0"
+            self._number(4, len(text))
+            self.data += text
+        elif bits or kind in ("bool", "byte", "char"):
+            self._number(int(bits[1]) // 8 if bits else 1, 0)
+        else:
+            self._struct(kind, path)
+
+    def _number(self, size: int, value: int) -> None:
+        self.data += bytes(-(len(self.data) - 4) % size)
+        self.data += value.to_bytes(size, "little")
+
+
+def nanoseconds_of(t_s: Floats) -> Ints:
+    """Whole nanoseconds of times in seconds (n)."""
+    whole = np.floor(t_s)
+    return whole.astype(np.int64) * 1_000_000_000 + np.round((t_s - whole) * 1e9).astype(np.int64)
+
+
+def _in_order(topics: list[Stamped]) -> Iterator[tuple[int, int, bytes]]:
+    """Stamp, topic and message of all topics in order of time."""
+    ns = np.concatenate([topic.stamp_ns for topic in topics])
+    which = np.repeat(np.arange(len(topics)), [topic.stamp_ns.size for topic in topics])
+    row = np.concatenate([np.arange(topic.stamp_ns.size) for topic in topics])
+    order = np.argsort(ns, kind="stable")
+    for at, topic, i in zip(ns[order].tolist(), which[order].tolist(), row[order].tolist(), strict=True):
+        yield at, topic, topics[topic].messages[i]
