@@ -38,13 +38,13 @@ Json = dict[str, Any]
 
 def calibration_json(c: Calibration) -> Json:
     """One run."""
-    return _document(
+    return strict_document(
         {
             "schema": SCHEMA,
             "sccal_version": __version__,
             "run": c.run,
             "vehicle": c.vehicle.name,
-            "variant": _variant(c.with_offset),
+            "variant": variant_key(c.with_offset),
             "verdict": str(run_verdict(c)),
             "parameters": _parameters(c.parameters),
             "effects": _effects(c.effects),
@@ -63,13 +63,13 @@ def calibration_json(c: Calibration) -> Json:
 
 def vehicle_json(v: VehicleCalibration) -> Json:
     """Several runs of one vehicle as one problem."""
-    return _document(
+    return strict_document(
         {
             "schema": SCHEMA,
             "sccal_version": __version__,
             "run": VEHICLE_RUN,
             "vehicle": v.vehicle.name,
-            "variant": _variant(v.with_offset),
+            "variant": variant_key(v.with_offset),
             "verdict": str(vehicle_verdict(v)),
             "parameters": _parameters(v.parameters),
             "effects": _effects(v.effects),
@@ -89,7 +89,8 @@ def json_text(document: Json) -> str:
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _variant(with_offset: bool) -> str:
+def variant_key(with_offset: bool) -> str:
+    """As the files name the two filters of the paper."""
     return "sc_ekf_offset" if with_offset else "sc_ekf"
 
 
@@ -219,7 +220,8 @@ def _notices(notices: Iterable[Notice]) -> list[Json]:
     ]
 
 
-def _document(blocks: Json) -> Json:
+def strict_document(blocks: Json) -> Json:
+    """What json_text can write: numbers that are not finite become null, text encodes as UTF-8."""
     return {name: _strict(block) for name, block in blocks.items()}
 
 

@@ -25,11 +25,11 @@ from sccal.report.figures import (
     SKY,
     VERMILION,
     Drawing,
-    _kept,
-    _plain_ticks,
-    _styled,
-    _svg,
-    _without_offset,
+    full_tick_labels,
+    plain_ticks,
+    styled,
+    svg_text,
+    thinned,
 )
 from sccal.report.numbers import one_line, plain, short
 from sccal.report.text import shortened
@@ -98,7 +98,7 @@ def drift_drawing(d: Diagnosis) -> Drawing | None:
 def residual_picture(picture: Picture, titles: tuple[str, str] = ("without the effect", "with the effect")) -> str:
     """Before with the fitted effect, and after, on one scale; one panel where there is no after."""
     after_known = bool(np.isfinite(picture.after).any())
-    with _styled("residual picture"):
+    with styled("residual picture"):
         figure = Figure(figsize=(_WIDE_IN, 3.3))
         panels = list(figure.subplots(1, 2, sharey=True)) if after_known else [figure.add_subplot()]
         figure.subplots_adjust(left=0.085, right=0.985, bottom=0.145, top=0.91, wspace=0.06)
@@ -115,16 +115,16 @@ def residual_picture(picture: Picture, titles: tuple[str, str] = ("without the e
             _points(panels[1], picture.x, picture.after, picture.after_sigma, BLUE)
             panels[1].set_title(titles[1])
         panels[0].set_ylim(_limits(picture))
-        _plain_ticks(panels[0], 6)
+        plain_ticks(panels[0], 6)
         for axes in panels:
-            _without_offset(axes)
-        return _svg(figure)
+            full_tick_labels(axes)
+        return svg_text(figure)
 
 
 def drift_before_after(before: Judgement, after: Judgement | None) -> str:
     """Each window's drift since it began, and the root mean square over the windows; one model if nothing changed."""
     models = [(before, BLUE, "as it is")] if after is None else [(before, VERMILION, "before"), (after, BLUE, "after")]
-    with _styled("drift before after"):
+    with styled("drift before after"):
         figure = Figure(figsize=(_NARROW_IN, 3.9))
         axes = figure.add_axes((0.13, 0.125, 0.84, 0.76))
         highest = 0.0
@@ -142,10 +142,10 @@ def drift_before_after(before: Judgement, after: Judgement | None) -> str:
         axes.set_ylim(0.0, 1.05 * min(most, 3.0 * highest or most) or 1.0)
         axes.set_xlabel("time without fixes (s)")
         axes.set_ylabel("drift (m)")
-        _plain_ticks(axes, 6)
+        plain_ticks(axes, 6)
         if drawn:
             axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.01), ncols=2, borderaxespad=0.0)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def candidates(finding: Finding, needed_nats: float) -> str:
@@ -154,7 +154,7 @@ def candidates(finding: Finding, needed_nats: float) -> str:
     if not any(one.name == finding.name for one in shown):
         shown = [*shown[: RANKED_SHOWN - 1], *(one for one in finding.ranking if one.name == finding.name)]
     gains = [one.held_out_gain_nats if math.isfinite(one.held_out_gain_nats) else 0.0 for one in shown]
-    with _styled("candidates"):
+    with styled("candidates"):
         height = 0.6 + 0.46 * len(shown)
         figure = Figure(figsize=(_NARROW_IN, height))
         axes = figure.add_axes((0.03, 0.45 / height, 0.94, 1.0 - 0.5 / height))
@@ -183,8 +183,8 @@ def candidates(finding: Finding, needed_nats: float) -> str:
         axes.grid(axis="y", visible=False)
         axes.xaxis.set_major_locator(MaxNLocator(6))
         axes.set_xlabel("gain on held-out data (nats)")
-        _without_offset(axes)
-        return _svg(figure)
+        full_tick_labels(axes)
+        return svg_text(figure)
 
 
 def _drawable(picture: Picture) -> bool:
@@ -220,7 +220,7 @@ def _thin_lines(axes: Axes, windows: Sequence[OutageWindow], colour: str) -> Non
     shown = windows[::every]
     alpha = 0.45 if len(shown) <= 12 else 0.22
     for window in shown:
-        kept = _kept(window.drift_m, 60)
+        kept = thinned(window.drift_m, 60)
         axes.plot((window.t_s - window.start_s)[kept], window.drift_m[kept], color=colour, lw=0.8, alpha=alpha)
 
 

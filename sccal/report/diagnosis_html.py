@@ -24,11 +24,11 @@ from sccal.report.diagnosis_text import (
     verdict_sentence,
 )
 from sccal.report.figures import Drawing
-from sccal.report.html import _page
+from sccal.report.html import page
 from sccal.report.numbers import one_line, plain, short
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.summary import warnings_first
-from sccal.report.text import _NUMBER_AND_UNIT, shortened
+from sccal.report.text import sentence, shortened
 
 RUNS_LISTED = 6
 
@@ -67,28 +67,28 @@ class Named:
 def diagnosis_html(d: Diagnosis) -> str:
     """The page."""
     constants = zip(parameter_rows(d.parameters_before), parameter_rows(d.parameters_after), strict=True)
-    return _page(
+    return page(
         "diagnosis.html.j2",
         d=d,
         verdict=_headline(d),
         runs=_runs(d),
-        trust=_sentence(d.trust),
+        trust=sentence(d.trust),
         steps=[_step(d, number) for number in range(len(d.findings))],
         constants=list(constants),
         added=something_added(d),
         judged=judgement_rows(d),
-        held_out_how=_sentence(d.held_out_how),
+        held_out_how=sentence(d.held_out_how),
         windows=len(d.after.windows),
         drift=drift_drawing(d),
         alternatives=[_alternative(d, finding) for finding in d.findings if finding.indistinguishable_from],
-        unexplained=_sentence(unexplained_sentence(d.unexplained)),
+        unexplained=sentence(unexplained_sentence(d.unexplained)),
         unexplained_drawing=unexplained_drawing(d.unexplained),
-        patterns=_sentence(patterns_sentence(d)),
-        not_excited=[Named(one.name, one.title, _sentence(one.advice)) for one in d.not_excited],
-        inseparable=[(one.names, _sentence(one.advice)) for one in d.inseparable],
+        patterns=sentence(patterns_sentence(d)),
+        not_excited=[Named(one.name, one.title, sentence(one.advice)) for one in d.not_excited],
+        inseparable=[(one.names, sentence(one.advice)) for one in d.inseparable],
         detectable=[Named(one.name, one.title, smallest_text(one)) for one in d.detectable],
-        placebo=_sentence(placebo_sentence(d)),
-        taken_back=[Named(name, title_of(name, d), _sentence(why)) for name, why in d.taken_back.items()],
+        placebo=sentence(placebo_sentence(d)),
+        taken_back=[Named(name, title_of(name, d), sentence(why)) for name, why in d.taken_back.items()],
         noises=[_noise_cells(one) for one in d.noises],
         notices=warnings_first(d.notices),
         version=__version__,
@@ -99,17 +99,17 @@ def _headline(d: Diagnosis) -> Headline:
     count = len(d.findings)
     if count:
         level = f"found: {count} effect{'' if count == 1 else 's'} beyond the model"
-        clauses = [_sentence(cause_clause(finding)) for finding in d.findings]
-        doubts = [_sentence(doubt) for finding in d.findings if (doubt := doubt_sentence(finding))]
-        left = [_sentence(f"Left without a name: {unexplained_sentence(d.unexplained)}")]
+        clauses = [sentence(cause_clause(finding)) for finding in d.findings]
+        doubts = [sentence(doubt) for finding in d.findings if (doubt := doubt_sentence(finding))]
+        left = [sentence(f"Left without a name: {unexplained_sentence(d.unexplained)}")]
         if count == 1:
-            clauses = [_sentence(f"{cause_clause(d.findings[0])}: {brings_clause(d)}")]
+            clauses = [sentence(f"{cause_clause(d.findings[0])}: {brings_clause(d)}")]
         else:
-            clauses.append(_sentence(brings_clause(d)))
+            clauses.append(sentence(brings_clause(d)))
         return Headline(level, (*clauses, *doubts, *(left if d.unexplained.significant else [])))
     if d.unexplained.significant or d.patterns:
-        return Headline("left without a name", (_sentence(verdict_sentence(d)),))
-    return Headline("nothing found", (_sentence(verdict_sentence(d)),))
+        return Headline("left without a name", (sentence(verdict_sentence(d)),))
+    return Headline("nothing found", (sentence(verdict_sentence(d)),))
 
 
 def _step(d: Diagnosis, number: int) -> Step:
@@ -118,9 +118,9 @@ def _step(d: Diagnosis, number: int) -> Step:
     return Step(
         number=number + 1,
         name=finding.name,
-        title=_sentence(finding.title, stop=False),
-        clause=_sentence(cause_clause(finding)),
-        looks_like=_sentence(known.looks_like) if known else "",
+        title=sentence(finding.title, stop=False),
+        clause=sentence(cause_clause(finding)),
+        looks_like=sentence(known.looks_like) if known else "",
         rows=finding_rows(finding),
         drawings=finding_drawings(d, number),
         facts=_evidence(d, finding),
@@ -146,7 +146,7 @@ def _evidence(d: Diagnosis, finding: Finding) -> tuple[tuple[str, str], ...]:
 
 def _alternative(d: Diagnosis, finding: Finding) -> tuple[str, list[Named], str]:
     others = [Named(name, title_of(name, d), "") for name in finding.indistinguishable_from]
-    return finding.name, others, _sentence(finding.advice)
+    return finding.name, others, sentence(finding.advice)
 
 
 def _runs(d: Diagnosis) -> str:
@@ -167,13 +167,3 @@ def _noise_cells(one: RunNoise) -> tuple[str, ...]:
         plain(n.fix_tau_s, 2),
         plain(n.slip_m_per_sqrt_m, 2),
     )
-
-
-def _sentence(text: str, stop: bool = True) -> str:
-    """With a capital at the beginning and a full stop at the end; names of effects keep their small letters."""
-    text = one_line(text)
-    first = text.partition(" ")[0]
-    if text and "_" not in first and "~" not in first:
-        text = text[0].upper() + text[1:]
-    text = _NUMBER_AND_UNIT.sub("\\1\u00a0", text)
-    return text if not stop or not text or text[-1] in ".!?…" else f"{text}."

@@ -10,14 +10,14 @@ from typing import Any
 
 from sccal import __version__
 from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
-from sccal.report.as_json import Json, _document, _estimate, _noise, _notices, _parameters
+from sccal.report.as_json import Json, _estimate, _noise, _notices, _parameters, strict_document
 
 SCHEMA = "sccal.diagnosis/1"
 
 
 def diagnosis_json(d: Diagnosis) -> Json:
     """The whole story as a document; findings in the order in which they were added."""
-    return _document(
+    return strict_document(
         {
             "schema": SCHEMA,
             "sccal_version": __version__,

@@ -13,7 +13,7 @@ from sccal.diagnose.result import Detectable, Diagnosis, Finding, Judgement, Run
 from sccal.effects.catalogue import CATALOGUE
 from sccal.report.numbers import MISSING, one_line, plain, short, value_and_sigma
 from sccal.report.rows import Row
-from sccal.report.text import _columns, _labelled, _notice_lines, _wrapped, shortened
+from sccal.report.text import in_columns, labelled, notice_lines, shortened, wrapped
 
 FINDINGS_IN_THE_VERDICT = 2
 ADVICE_SHOWN = 4
@@ -41,25 +41,25 @@ _PORTS = {
 def diagnosis_text(d: Diagnosis, width: int = 100) -> str:
     """The whole story, short: about 35 lines where one or two effects were found."""
     lines = [
-        *_wrapped(verdict_sentence(d), width),
+        *wrapped(verdict_sentence(d), width),
         "",
-        *_wrapped(f"{runs_line(d)}: {d.trust}" if d.trust else runs_line(d), width),
+        *wrapped(f"{runs_line(d)}: {d.trust}" if d.trust else runs_line(d), width),
         "",
     ]
     if d.findings:
         lines += [*_findings_table(d.findings, width), ""]
-    lines += [*_judgement_table(d, width), *_wrapped(f"  ({d.held_out_how})", width, "  "), ""]
+    lines += [*_judgement_table(d, width), *wrapped(f"  ({d.held_out_how})", width, "  "), ""]
     if not d.findings and d.detectable:
-        lines += _labelled("found if", [detectable_line(d.detectable)], width)
+        lines += labelled("found if", [detectable_line(d.detectable)], width)
     lines += [
-        *_labelled("or else", [line for f in d.findings if (line := doubt_sentence(f))], width),
-        *_labelled("left", [unexplained_sentence(d.unexplained), patterns_sentence(d)], width),
-        *_labelled("alike", _cut(inseparable_lines(d), INSEPARABLE_SHOWN), width),
-        *_labelled("unseen", _cut(unseen_lines(d), ADVICE_SHOWN), width),
-        *_labelled("back", [f"{name} was taken back: {why}" for name, why in d.taken_back.items()], width),
-        *_labelled("chance", [placebo_sentence(d)], width),
-        *_labelled("noise", [noise_line(d.noises)], width),
-        *_labelled("notices", _notice_lines([("", notice) for notice in d.notices], JSON), width),
+        *labelled("or else", [line for f in d.findings if (line := doubt_sentence(f))], width),
+        *labelled("left", [unexplained_sentence(d.unexplained), patterns_sentence(d)], width),
+        *labelled("alike", _cut(inseparable_lines(d), INSEPARABLE_SHOWN), width),
+        *labelled("unseen", _cut(unseen_lines(d), ADVICE_SHOWN), width),
+        *labelled("back", [f"{name} was taken back: {why}" for name, why in d.taken_back.items()], width),
+        *labelled("chance", [placebo_sentence(d)], width),
+        *labelled("noise", [noise_line(d.noises)], width),
+        *labelled("notices", notice_lines([("", notice) for notice in d.notices], JSON), width),
     ]
     return "\n".join(lines) + "\n"
 
@@ -260,14 +260,14 @@ def _findings_table(findings: Sequence[Finding], width: int) -> list[str]:
             )
             if row.estimate.status != "estimated":
                 reasons.append(f"{finding.name} {row.name}: {row.status}; {row.reason}".removesuffix("; "))
-    return [*_columns(table, "<<><<>>"), *(line for reason in reasons for line in _wrapped(reason, width, "  "))]
+    return [*in_columns(table, "<<><<>>"), *(line for reason in reasons for line in wrapped(reason, width, "  "))]
 
 
 def _judgement_table(d: Diagnosis, width: int) -> list[str]:
     header = ("held out", "", "before", "after") if something_added(d) else ("held out", "", "as it is", "")
     table = [header, *(row if something_added(d) else (*row[:3], "") for row in judgement_rows(d))]
     room = width - sum(2 + max(map(len, column)) for column in list(zip(*table, strict=True))[1:])
-    return _columns([(shortened(what, max(room, 8)), *rest) for what, *rest in table], "<<>>")
+    return in_columns([(shortened(what, max(room, 8)), *rest) for what, *rest in table], "<<>>")
 
 
 def _end_drift(judgement: Judgement) -> str:

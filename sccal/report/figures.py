@@ -127,14 +127,14 @@ def vehicle_drawings(v: VehicleCalibration) -> tuple[Drawing, ...]:
 
 def path_map(c: Calibration) -> str:
     """Fixes by quality, the trajectory, start and end; equal scales."""
-    with _styled("path"):
+    with styled("path"):
         figure = Figure(figsize=(_WIDTH_IN, 5.4))
         axes = figure.add_axes((0.13, 0.1, 0.84, 0.74))
-        every = _strided(len(c.trajectory.t_s), POINTS)
+        every = strided(len(c.trajectory.t_s), POINTS)
         east, north = c.trajectory.east_m[every], c.trajectory.north_m[every]
         axes.plot(east, north, color="#bbbbbb", lw=2.0, label="estimated path")
         for mask, label, colour in _by_quality(c.fixes.quality):
-            every = _strided(int(mask.sum()), POINTS)
+            every = strided(int(mask.sum()), POINTS)
             axes.plot(
                 c.fixes.east_m[mask][every], c.fixes.north_m[mask][every], ".", ms=3.0, mew=0, color=colour, label=label
             )
@@ -146,9 +146,9 @@ def path_map(c: Calibration) -> str:
         axes.margins(0.06)
         axes.set_xlabel("east (m)")
         axes.set_ylabel("north (m)")
-        _plain_ticks(axes, 6)
+        plain_ticks(axes, 6)
         axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.01), ncols=3, markerscale=1.0, borderaxespad=0.0)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def parameter_history(c: Calibration) -> str:
@@ -159,13 +159,13 @@ def parameter_history(c: Calibration) -> str:
         (h.radius_right_m, h.sigma_radius_right_m),
         (h.radius_left_m, h.sigma_radius_left_m),
         (h.track_m, h.sigma_track_m),
-        (_offset_deg(h.heading_offset_rad, rows[3].estimate.value), np.degrees(h.sigma_heading_offset_rad)),
+        (offset_on_turn_deg(h.heading_offset_rad, rows[3].estimate.value), np.degrees(h.sigma_heading_offset_rad)),
     )
-    with _styled("parameters"):
+    with styled("parameters"):
         figure, panels = _stacked(4, 6.4)
-        time, label = _elapsed(h.t_s, _start_s(c), _end_s(c))
+        time, label = elapsed(h.t_s, _start_s(c), _end_s(c))
         for axes, row, (values, sigmas) in zip(panels, rows, series, strict=True):
-            every = _kept(values, POINTS)
+            every = thinned(values, POINTS)
             t, value, sigma = time[every], values[every], sigmas[every]
             axes.fill_between(t, value - sigma, value + sigma, color=SKY, alpha=0.35, lw=0)
             axes.plot(t, value, color=BLUE, lw=1.0)
@@ -181,9 +181,9 @@ def parameter_history(c: Calibration) -> str:
                 else:
                     title += f" – nominal {short(nominal)} {'below' if nominal < limits[0] else 'above'}"
             axes.set_title(title)
-            _plain_ticks(axes, 4)
+            plain_ticks(axes, 4)
         panels[-1].set_xlabel(label)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def residual_series(c: Calibration) -> str:
@@ -201,28 +201,28 @@ def residual_series(c: Calibration) -> str:
         ("fix east (m)", *fixes, r.fix_east_m, r.fix_sigma_east_m),
         ("fix north (m)", *fixes, r.fix_north_m, r.fix_sigma_north_m),
     )
-    with _styled("residuals"):
+    with styled("residuals"):
         figure, panels = _stacked(3, 6.0, top=0.91)
         label = ""
         for axes, (name, t_s, accepted, residual, sigma) in zip(panels, panels_of, strict=True):
-            time, label = _elapsed(t_s, _start_s(c), _end_s(c))
+            time, label = elapsed(t_s, _start_s(c), _end_s(c))
             axes.set_title(f"{name}: {int(accepted.sum())} accepted, {int((~accepted).sum())} rejected")
             _draw_residuals(axes, time, accepted, residual, sigma)
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="upper left", bbox_to_anchor=(0.1, 1.0), ncols=3)
         panels[-1].set_xlabel(label)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def outage_drift(outage: Outage) -> str:
     """Each window's drift since the window began; the rms at the windows' end where there is one."""
-    with _styled("outage"):
+    with styled("outage"):
         figure = Figure(figsize=(_WIDTH_IN, 3.9))
         axes = figure.add_axes((0.13, 0.125, 0.84, 0.76))
         budget = max(20, 4 * POINTS // max(len(outage.windows), 1))
         alpha = 0.75 if len(outage.windows) <= 12 else 0.35
         for k, window in enumerate(outage.windows):
-            every = _kept(window.drift_m, budget)
+            every = thinned(window.drift_m, budget)
             axes.plot(
                 (window.t_s - window.start_s)[every],
                 window.drift_m[every],
@@ -240,16 +240,16 @@ def outage_drift(outage: Outage) -> str:
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel("time without fixes (s)")
         axes.set_ylabel("drift (m)")
-        _plain_ticks(axes, 6)
+        plain_ticks(axes, 6)
         if outage.windows:
             axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.01), ncols=2, borderaxespad=0.0)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def runs_compared(v: VehicleCalibration) -> str:
     """One panel a parameter, one line a run; the first RUNS_SHOWN runs."""
     runs = v.runs[:RUNS_SHOWN]
-    with _styled("runs"):
+    with styled("runs"):
         height = 0.75 + 0.26 * len(runs)
         figure = Figure(figsize=(2 * _WIDTH_IN, height))
         panels = figure.subplots(1, 4, sharey=True)
@@ -262,10 +262,10 @@ def runs_compared(v: VehicleCalibration) -> str:
             _compare_runs(axes, row.estimate, own)
             axes.set_title(f"{row.name} ({row.unit})")
             axes.xaxis.set_major_locator(MaxNLocator(3))
-            _without_offset(axes)
+            full_tick_labels(axes)
         panels[0].set_yticks(range(len(runs)), [_label(c.run) for c in runs])
         panels[0].set_ylim(len(runs) - 0.5, -0.5)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def _compare_runs(axes: Axes, shared: Estimate, own: Sequence[Estimate]) -> None:
@@ -299,21 +299,21 @@ def _on_the_turn_of(shared: Estimate, own: Estimate) -> Estimate:
 
 def _draw_residuals(axes: Axes, time: Floats, accepted: Bools, residual: Floats, sigma: Floats) -> None:
     limit = _residual_limit(accepted, residual, sigma)
-    every = _kept(sigma, POINTS // 2)
+    every = thinned(sigma, POINTS // 2)
     bound = np.clip(2.0 * sigma[every], 0.0, limit)
     axes.fill_between(time[every], -bound, bound, color=SKY, alpha=0.35, lw=0, label="±2σ")
     edge = 0.97 * limit
     t, value = time[accepted], np.clip(residual[accepted], -edge, edge)
-    every_n = _strided(len(t), CLOUD_POINTS)
+    every_n = strided(len(t), CLOUD_POINTS)
     if len(t) > CLOUD_POINTS:
         lowest, highest, middle = _ranges(t, value, CLOUD_POINTS // 4)
         axes.fill_between(middle, lowest, highest, color=BLUE, alpha=0.25, lw=0)
     axes.plot(t[every_n], value[every_n], ".", ms=2.4, mew=0, color=BLUE, label="accepted")
     t, value = time[~accepted], np.clip(residual[~accepted], -edge, edge)
-    every = _kept(value, CLOUD_POINTS // 4)
+    every = thinned(value, CLOUD_POINTS // 4)
     axes.plot(t[every], value[every], "x", ms=4, mew=0.9, color=VERMILION, clip_on=False, label="rejected")
     axes.set_ylim(-limit, limit)
-    _plain_ticks(axes, 5)
+    plain_ticks(axes, 5)
 
 
 def _outage_drawing(outage: Outage) -> Drawing:
@@ -354,7 +354,7 @@ def _residual_limit(accepted: Bools, residual: Floats, sigma: Floats) -> float:
     return 1.6 * largest or 1.0
 
 
-def _offset_deg(history_rad: Floats, final_deg: float) -> Floats:
+def offset_on_turn_deg(history_rad: Floats, final_deg: float) -> Floats:
     """Continuous, and on the turn on which the final value stands."""
     degrees = np.degrees(history_rad)
     finite = np.isfinite(degrees)
@@ -364,12 +364,13 @@ def _offset_deg(history_rad: Floats, final_deg: float) -> Floats:
     return degrees
 
 
-def _strided(count: int, most: int) -> slice:
+def strided(count: int, most: int) -> slice:
+    """An even choice of at most so many out of a series: for clouds."""
     return slice(None, None, max(1, math.ceil(count / most)))
 
 
-def _kept(values: Floats, most: int) -> Ints:
-    """Indices that keep the lowest and highest value of each stretch, and both ends, in order of time."""
+def thinned(values: Floats, most: int) -> Ints:
+    """Indices (k,) that keep the lowest and highest value of each stretch, and both ends, in order of time."""
     count = len(values)
     if count <= most:
         return np.arange(count)
@@ -400,7 +401,8 @@ def _end_s(c: Calibration) -> float:
     return float(max(ends, default=1.0))
 
 
-def _elapsed(t_s: Floats, start_s: float, end_s: float) -> tuple[Floats, str]:
+def elapsed(t_s: Floats, start_s: float, end_s: float) -> tuple[Floats, str]:
+    """Times from the start, in minutes where the whole is long, and the label of their axis."""
     if end_s - start_s > 600.0:
         return (t_s - start_s) / 60.0, "time since the start (min)"
     return t_s - start_s, "time since the start (s)"
@@ -423,12 +425,13 @@ def _level(axes: Axes, value: float, **style: Any) -> None:
         axes.axhline(value, **style)
 
 
-def _plain_ticks(axes: Axes, most: int) -> None:
+def plain_ticks(axes: Axes, most: int) -> None:
+    """At most so many ticks upwards, with labels in full."""
     axes.yaxis.set_major_locator(MaxNLocator(most))
-    _without_offset(axes)
+    full_tick_labels(axes)
 
 
-def _without_offset(axes: Axes) -> None:
+def full_tick_labels(axes: Axes) -> None:
     """Tick labels in full: never 1e-5 + 8.08e-2 in a corner."""
     for axis in (axes.xaxis, axes.yaxis):
         if isinstance(axis.get_major_formatter(), ScalarFormatter):
@@ -437,11 +440,12 @@ def _without_offset(axes: Axes) -> None:
             axis.set_major_formatter(formatter)
 
 
-def _styled(name: str) -> AbstractContextManager[None]:
+def styled(name: str) -> AbstractContextManager[None]:
+    """The look of all figures; the name makes the ids within the SVG its own, and the same each time."""
     return matplotlib.rc_context({**_STYLE, "svg.hashsalt": f"sccal {name}"})
 
 
-def _svg(figure: Figure) -> str:
+def svg_text(figure: Figure) -> str:
     """Without XML prologue, date, or ids that nothing refers to: several figures share one page."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})

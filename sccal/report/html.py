@@ -49,7 +49,7 @@ class RunLine:
 
 def run_html(c: Calibration) -> str:
     """The page of one run."""
-    return _page(
+    return page(
         "run.html.j2",
         c=c,
         verdict=run_verdict(c),
@@ -75,7 +75,7 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     time = duration(sum(c.drive.duration_s for c in v.runs))
     chi2 = v.consistency_chi2_per_dof
     agreement = "" if chi2 is None else f"agree to chi2 per dof {short(chi2, 3)} (1 is consistent)"
-    return _page(
+    return page(
         "vehicle.html.j2",
         v=v,
         verdict=vehicle_verdict(v),
@@ -95,7 +95,7 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     )
 
 
-def _page(template: str, **content: object) -> str:
+def page(template: str, **content: object) -> str:
     """Names from a file system may hold what UTF-8 cannot; it becomes a question mark."""
     return _PAGES.get_template(template).render(content).encode("utf-8", "replace").decode("utf-8")
 

@@ -30,7 +30,7 @@ REASONS_SHOWN = 8
 NARROWEST_NAME = 12
 """Columns for the names of runs below which the table does without its last column, the verdict."""
 _LABEL = 9
-_NUMBER_AND_UNIT = re.compile(r"(\d) (?=(?:m|m/s|s|ms|deg|ppm|%|min|h|windows?|runs?)(?:\W|$))")
+NUMBER_AND_UNIT = re.compile(r"(\d) (?=(?:m|m/s|s|ms|deg|ppm|%|min|h|windows?|runs?)(?:\W|$))")
 _MARKS: dict[Status, str] = {"estimated": "", "unobserved": "?", "at_bound": "!", "held": "="}
 _MARKS_MEAN = {"?": "? not observed", "!": "! at bound", "=": "= held"}
 
@@ -38,21 +38,21 @@ _MARKS_MEAN = {"?": "? not observed", "!": "! at bound", "=": "= held"}
 def run_text(c: Calibration, width: int = 100) -> str:
     """One run in full."""
     lines = [
-        *_wrapped(str(run_verdict(c)), width),
+        *wrapped(str(run_verdict(c)), width),
         "",
-        *_wrapped(f"{c.run} ({c.vehicle.name}): {drive_line(c.drive)}", width),
+        *wrapped(f"{c.run} ({c.vehicle.name}): {drive_line(c.drive)}", width),
         "",
         *_parameter_table((*parameter_rows(c.parameters), *effect_rows(c.effects)), width),
         "",
-        *_labelled("fixes", [fixes_line(c.fit)], width),
-        *_labelled("heading", [headings_line(c.fit)], width),
-        *_labelled("filter", [recoveries_line(c.fit)], width),
-        *_labelled("outage", [outage_line(c.outage)], width),
-        *_labelled("losses", reference_lines(c.against_reference), width),
-        *_labelled("unseen", [unseen_line(c.unseen)], width),
-        *_labelled("noise", _noise(c.noise), width),
-        *_labelled("clock", [clock_line(c.clock)], width),
-        *_labelled("notices", _notice_lines([("", n) for n in c.notices], "calibration.json"), width),
+        *labelled("fixes", [fixes_line(c.fit)], width),
+        *labelled("heading", [headings_line(c.fit)], width),
+        *labelled("filter", [recoveries_line(c.fit)], width),
+        *labelled("outage", [outage_line(c.outage)], width),
+        *labelled("losses", reference_lines(c.against_reference), width),
+        *labelled("unseen", [unseen_line(c.unseen)], width),
+        *labelled("noise", _noise(c.noise), width),
+        *labelled("clock", [clock_line(c.clock)], width),
+        *labelled("notices", notice_lines([("", n) for n in c.notices], "calibration.json"), width),
     ]
     return "\n".join(lines) + "\n"
 
@@ -64,22 +64,20 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
     time = duration(sum(c.drive.duration_s for c in v.runs))
     notices = [("", n) for n in v.notices] + [(c.run, n) for c in v.runs for n in c.notices]
     lines = [
-        *_wrapped(str(vehicle_verdict(v)), width),
+        *wrapped(str(vehicle_verdict(v)), width),
         "",
         *_run_table(v.runs, width),
         "",
-        *_wrapped(f"{v.vehicle.name}: {len(v.runs)} run{'' if len(v.runs) == 1 else 's'}, {time}, {distance} m", width),
+        *wrapped(f"{v.vehicle.name}: {len(v.runs)} run{'' if len(v.runs) == 1 else 's'}, {time}, {distance} m", width),
         "",
         *_parameter_table((*parameter_rows(v.parameters), *effect_rows(v.effects)), width),
         "",
-        *_labelled(
-            "runs", [] if chi2 is None else [f"agree to chi2 per dof {short(chi2, 3)} (1 is consistent)"], width
-        ),
-        *_labelled("fixes", [fixes_line(v.fit)], width),
-        *_labelled("heading", [headings_line(v.fit)], width),
-        *_labelled("filter", [recoveries_line(v.fit)], width),
-        *_labelled("outage", [outage_line(v.outage)], width),
-        *_labelled(
+        *labelled("runs", [] if chi2 is None else [f"agree to chi2 per dof {short(chi2, 3)} (1 is consistent)"], width),
+        *labelled("fixes", [fixes_line(v.fit)], width),
+        *labelled("heading", [headings_line(v.fit)], width),
+        *labelled("filter", [recoveries_line(v.fit)], width),
+        *labelled("outage", [outage_line(v.outage)], width),
+        *labelled(
             "losses",
             [
                 f"{shortened(one_line(c.run), 40)}: {line}"
@@ -88,8 +86,8 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
             ],
             width,
         ),
-        *_labelled("unseen", [unseen_line(unseen_in_all([c.unseen for c in v.runs]))], width),
-        *_labelled("notices", _notice_lines(notices, "the runs' calibration.json"), width),
+        *labelled("unseen", [unseen_line(unseen_in_all([c.unseen for c in v.runs]))], width),
+        *labelled("notices", notice_lines(notices, "the runs' calibration.json"), width),
     ]
     return "\n".join(lines) + "\n"
 
@@ -108,12 +106,12 @@ def _parameter_table(rows: Sequence[Row], width: int) -> list[str]:
         )
         for row in rows
     ]
-    lines = _columns([header, *cells], "<><<>><")
+    lines = in_columns([header, *cells], "<><<>><")
     reasons = [(row.name, row.reason) for row in rows if row.reason]
     if reasons:
         lines.append("")
     for name, reason in reasons:
-        lines += _wrapped(f"{name}: {reason}", width, "  ")
+        lines += wrapped(f"{name}: {reason}", width, "  ")
     return lines
 
 
@@ -126,7 +124,7 @@ def _run_table(runs: Sequence[Calibration], width: int) -> list[str]:
         columns = columns[:-1]
         room = max(width - _width_of(columns), 1)
     names = ("run", *(shortened(one_line(c.run), room) for c in runs))
-    lines = _columns(list(zip(names, *columns, strict=True)), "<>>>>><"[: 1 + len(columns)])
+    lines = in_columns(list(zip(names, *columns, strict=True)), "<>>>>><"[: 1 + len(columns)])
     statuses = {row.estimate.status for c in runs for row in parameter_rows(c.parameters)}
     legend = [_MARKS_MEAN[mark] for status, mark in _MARKS.items() if mark and status in statuses]
     if legend:
@@ -145,7 +143,7 @@ def _run_doubts(runs: Sequence[Calibration], width: int) -> list[str]:
         doubts += [f"{name}: {row.name}: {row.reason}" for row in parameter_rows(c.parameters) if row.reason]
     lines = [""] if doubts else []
     for doubt in doubts[:REASONS_SHOWN]:
-        lines += _wrapped(doubt, width, "  ")
+        lines += wrapped(doubt, width, "  ")
     if len(doubts) > REASONS_SHOWN:
         lines.append(f"  … and {len(doubts) - REASONS_SHOWN} more in the runs' calibration.json")
     return lines
@@ -187,7 +185,8 @@ def shortened(name: str, room: int) -> str:
     return f"{name[:head]}…{name[len(name) - (room - 1 - head) :]}"
 
 
-def _notice_lines(notices: Iterable[tuple[str, Notice]], rest_in: str) -> list[str]:
+def notice_lines(notices: Iterable[tuple[str, Notice]], rest_in: str) -> list[str]:
+    """One line each, of (run or empty, notice); warnings first, the surplus by its number and where it stands."""
     ordered = sorted(notices, key=lambda pair: pair[1].severity != "warning")
     lines = [
         ("warning: " if notice.severity == "warning" else "")
@@ -206,7 +205,7 @@ def _noise(noise: Noise) -> list[str]:
     return [", ".join(f"{subject} {fact}" for subject, fact in facts) + f" ({source})"]
 
 
-def _columns(table: Sequence[Sequence[str]], alignment: str) -> list[str]:
+def in_columns(table: Sequence[Sequence[str]], alignment: str) -> list[str]:
     """Cells padded to their column, two blanks between columns; ``<`` left, ``>`` right."""
     widths = [max(len(row[i]) for row in table) for i in range(len(alignment))]
     return [
@@ -218,16 +217,17 @@ def _columns(table: Sequence[Sequence[str]], alignment: str) -> list[str]:
     ]
 
 
-def _labelled(label: str, texts: Iterable[str], width: int) -> list[str]:
-    lines = [line for text in texts if text for line in _wrapped(text, width, " " * _LABEL)]
+def labelled(label: str, texts: Iterable[str], width: int) -> list[str]:
+    """A paragraph for each text that is not empty, the label in the margin of the first."""
+    lines = [line for text in texts if text for line in wrapped(text, width, " " * _LABEL)]
     if lines:
         lines[0] = label.ljust(_LABEL) + lines[0][_LABEL:]
     return lines
 
 
-def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+def wrapped(text: str, width: int, indent: str = "") -> list[str]:
     """Broken between words, but never between a number and its unit."""
-    glued = _NUMBER_AND_UNIT.sub("\\1\u00a0", one_line(text))
+    glued = NUMBER_AND_UNIT.sub("\\1\u00a0", one_line(text))
     lines = textwrap.wrap(
         glued,
         width,
@@ -237,3 +237,13 @@ def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
         break_on_hyphens=False,
     )
     return [line.replace("\u00a0", " ") for line in lines]
+
+
+def sentence(text: str, stop: bool = True) -> str:
+    """With a capital at the beginning and a full stop at the end; names of effects keep their small letters."""
+    text = one_line(text)
+    first = text.partition(" ")[0]
+    if text and "_" not in first and "~" not in first:
+        text = text[0].upper() + text[1:]
+    text = NUMBER_AND_UNIT.sub("\\1\u00a0", text)
+    return text if not stop or not text or text[-1] in ".!?…" else f"{text}."

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from sccal.calibration.result import Calibration, Fixes, History, Residuals, Trajectory, VehicleCalibration
-from sccal.report.figures import _kept, outage_drift, path_map, run_drawings
+from sccal.report.figures import outage_drift, path_map, run_drawings, thinned
 from sccal.report.html import run_html, vehicle_html
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
@@ -125,7 +125,7 @@ def test_an_outage_without_windows_can_be_drawn(an_ugly_run: Calibration) -> Non
 def test_thinning_keeps_extremes_and_ends() -> None:
     values = np.random.default_rng(0).normal(size=100_003)
     values[[17, 99_999]] = 50.0, -50.0
-    kept = _kept(values, 1000)
+    kept = thinned(values, 1000)
     assert len(kept) <= 1000
     assert (np.diff(kept) > 0).all()
     assert {0, 17, 99_999, 100_002} <= set(kept.tolist())

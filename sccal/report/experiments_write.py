@@ -1,0 +1,20 @@
+"""The experiments into a folder; a reader meets each file whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sccal.experiments.result import Experiments
+from sccal.logs.write import write_text
+from sccal.report.as_json import json_text
+from sccal.report.experiments_json import experiments_json
+
+
+def write_experiments(e: Experiments, out: Path) -> Path:
+    """``experiments.json`` first, which needs no matplotlib, then ``experiments.html``; returns the page's path."""
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "experiments.json", json_text(experiments_json(e)))
+    from sccal.report.experiments_html import experiments_html
+
+    write_text(out / "experiments.html", experiments_html(e))
+    return out / "experiments.html"
