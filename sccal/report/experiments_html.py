@@ -25,6 +25,7 @@ from sccal.report.experiments_text import (
 from sccal.report.figures import Drawing
 from sccal.report.html import page
 from sccal.report.numbers import one_line, short, value_and_sigma
+from sccal.report.rows import STATUS_WORDS
 from sccal.report.text import sentence
 
 _ROWS = ("right radius (m)", "left radius (m)", "track (m)", "heading offset (deg)")
@@ -80,7 +81,7 @@ def experiments_html(e: Experiments) -> str:
         failed=[(one_line(one.name), sentence(one.reason)) for one in e.failed],
         measured=any(cell.measured for cell in e.cells),
         offset="" if (offset := whole_offset_deg(e)) is None else f"{short(offset)}\u00a0deg",
-        wander=f"σ {WANDER_DEG:g}\u00a0deg, correlated over {WANDER_TIME_S:g}\u00a0s",
+        wander=f"σ\u00a0{WANDER_DEG:g}\u00a0deg, correlated over {WANDER_TIME_S:g}\u00a0s",
         tolerance=f"{TOLERANCE_PERCENT:g}\u00a0%",
         version=__version__,
     )
@@ -116,7 +117,7 @@ def _parameters(cell: Cell) -> tuple[tuple[str, str, str, str], ...]:
     if cell.truth is None:
         return ()
     return tuple(
-        (name, short(cell.truth[k], 4), _value(cell, "without", k), _value(cell, "with", k))
+        (name, short(cell.truth[k]), _value(cell, "without", k), _value(cell, "with", k))
         for k, name in enumerate(_ROWS[: len(PARAMETERS)])
     )
 
@@ -125,6 +126,6 @@ def _value(cell: Cell, variant: str, k: int) -> str:
     figures = cell.figures["with" if variant == "with" else "without"]
     status = figures.statuses[0][k]
     if status in ("held", "unobserved"):
-        return "held at 0" if status == "held" and figures.values[0, k] == 0.0 else status
+        return "held at 0" if status == "held" and figures.values[0, k] == 0.0 else STATUS_WORDS[status]
     value, sigma = value_and_sigma(float(figures.values[0, k]), float(figures.sigmas[0, k]))
-    return f"{value} ± {sigma}"
+    return f"{value} ± {sigma}" if status == "estimated" else f"{value}, {STATUS_WORDS[status]}"

@@ -44,7 +44,7 @@ def experiments_text(e: Experiments, width: int = 100) -> str:
     lines = [line for text in answers(e) for line in wrapped(text, width)]
     lines += ["", *wrapped(f"{setting(e)} {reading()}", width), ""]
     lines += [*_table(e, width), ""]
-    lines += labelled("not 1 %" if TOLERANCE_PERCENT == 1.0 else "beyond", whys(e), width)
+    lines += labelled("beyond", whys(e), width)
     failed = [f"{shortened(one_line(one.name), LONGEST_NAME)}: {one.reason}" for one in e.failed]
     rest = [f"… and {len(failed) - FAILED_SHOWN} more in experiments.json"] if len(failed) > FAILED_SHOWN else []
     lines += labelled("failed", [*failed[:FAILED_SHOWN], *rest], width)

@@ -70,7 +70,7 @@ _STYLE: dict[Any, Any] = {
 _UNUSED_ID = re.compile(r' id="[A-Za-z0-9.]+_\d+"')
 _SURPLUS_DECIMALS = re.compile(r"(?<![\d.(])(\d+\.\d\d)\d+")
 """Beyond a hundredth of a point; an opening bracket before it would be a glyph's scale."""
-_TRAILING_BLANKS = re.compile(r"[ \t]+$", re.MULTILINE)
+_OUTER_BLANKS = re.compile(r"^[ \t]+|[ \t]+$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -451,4 +451,4 @@ def svg_text(figure: Figure) -> str:
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = buffer.getvalue()
     text = _UNUSED_ID.sub("", text[text.index("<svg") :])
-    return _TRAILING_BLANKS.sub("", _SURPLUS_DECIMALS.sub(r"\1", text))
+    return _OUTER_BLANKS.sub("", _SURPLUS_DECIMALS.sub(r"\1", text))

@@ -31,6 +31,7 @@ NARROWEST_NAME = 12
 """Columns for the names of runs below which the table does without its last column, the verdict."""
 _LABEL = 9
 NUMBER_AND_UNIT = re.compile(r"(\d) (?=(?:m|m/s|s|ms|deg|ppm|%|min|h|windows?|runs?)(?:\W|$))")
+_SIGN_AND_NUMBER = re.compile(r"(?<=[±σ=]) (?=[=\d])")
 _MARKS: dict[Status, str] = {"estimated": "", "unobserved": "?", "at_bound": "!", "held": "="}
 _MARKS_MEAN = {"?": "? not observed", "!": "! at bound", "=": "= held"}
 
@@ -245,5 +246,5 @@ def sentence(text: str, stop: bool = True) -> str:
     first = text.partition(" ")[0]
     if text and "_" not in first and "~" not in first:
         text = text[0].upper() + text[1:]
-    text = NUMBER_AND_UNIT.sub("\\1\u00a0", text)
+    text = _SIGN_AND_NUMBER.sub("\u00a0", NUMBER_AND_UNIT.sub("\\1\u00a0", text))
     return text if not stop or not text or text[-1] in ".!?…" else f"{text}."
