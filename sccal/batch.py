@@ -20,9 +20,12 @@ from sccal.errors import DataError, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import find_start
+from sccal.inspect.inspect import inspect_run
+from sccal.inspect.result import Inspection
 from sccal.logs.run import RunSource, discover, read_run
 from sccal.logs.streams import Vehicle
 from sccal.report.diagnosis_write import write_diagnosis
+from sccal.report.inspect_write import write_inspection
 from sccal.report.write import begin_loading, write_calibration, write_vehicle
 
 
@@ -140,6 +143,29 @@ def diagnose_paths(
             continue
         diagnosed.append((diagnosis, folder / "diagnosis.html"))
     return diagnosed, failures
+
+
+def inspect_paths(paths: Sequence[Path], out: Path | None) -> tuple[list[tuple[Inspection, Path | None]], list[Failure]]:
+    """Inspect every run below the paths; with ``out``, a page and JSON for each to out/<run>.
+
+    Returns every inspection with its page, and what could not be inspected at all.
+    """
+    sources, failures = find_runs(paths)
+    if sources:
+        if out is not None:
+            _check_out(out, sources)
+            begin_loading()
+        say_if_compiling()
+    inspected: list[tuple[Inspection, Path | None]] = []
+    for source in sources:
+        try:
+            found = inspect_run(source)
+            page = None if out is None else write_inspection(found, out / source.name)
+        except Exception as error:
+            failures.append(Failure(source.name, error if isinstance(error, SccalError) else _as_known(error)))
+            continue
+        inspected.append((found, page))
+    return inspected, failures
 
 
 def _as_known(error: Exception) -> SccalError:

@@ -21,7 +21,7 @@ FLOORS = (
     {"effects"},
     {"filter"},
     {"calibration"},
-    {"diagnose"},
+    {"diagnose", "inspect"},
     {"report"},
     {"batch"},
     {"cli"},

@@ -14,7 +14,7 @@ from sccal.logs.streams import Notice
 
 GAP_STEPS = 3.0
 GAP_S = 0.5
-GAPS_TOLD = 5
+GAPS_TOLD = 100
 METRES_PER_DEGREE = 111_320.0
 _SAME_RAD = 1e-8
 _SAME_DEG = 1e-10
@@ -43,8 +43,11 @@ def _facts(name: StreamName, source: str, t_s: Floats, streams: LogStreams, toge
     limit = longest_step_s(t_s)
     wide = np.flatnonzero(steps > limit)
     longest = wide[np.argsort(steps[wide])[::-1]][:GAPS_TOLD]
-    usual = steps[steps <= limit]
-    low, high = np.quantile(usual, (0.159, 0.841)) if usual.size else (np.nan, np.nan)
+    usual_s = float(np.median(steps))
+    whole_steps = np.maximum(np.round(steps[steps <= limit] / usual_s), 1.0)
+    off = steps[steps <= limit] - whole_steps * usual_s
+    low, high = np.quantile(off, (0.159, 0.841)) if off.size else (np.nan, np.nan)
+    missing = float(whole_steps.sum() - whole_steps.size)
     first, last = together.span_s
     shares = name not in together.apart
     whole = last - first if shares else float(t_s[-1] - t_s[0])
@@ -58,6 +61,7 @@ def _facts(name: StreamName, source: str, t_s: Floats, streams: LogStreams, toge
         last_s=float(t_s[-1]),
         rate_hz=1.0 / float(np.median(steps)),
         jitter_s=float(0.5 * (high - low)),
+        missing=missing / (t_s.size + missing),
         longest_step_s=float(steps.max()),
         gaps=tuple(Gap(float(t_s[k]), float(steps[k])) for k in longest),
         gap_count=int(wide.size),
@@ -81,8 +85,10 @@ def _repaired(source: str, notices: Iterable[Notice]) -> int:
 def _resolution(name: StreamName, streams: LogStreams) -> tuple[float, str]:
     if name == "wheels" and streams.wheels is not None and streams.vehicle is not None:
         wheels = streams.wheels
-        steps = (np.diff(one[~_across(wheels.loose)]) for one in (wheels.left_rad, wheels.right_rad))
-        smallest = _smallest(np.concatenate(list(steps)), _SAME_RAD)
+        own = ~wheels.loose[1:]
+        # At speed no step is one count, but steps differ by whole counts.
+        steps = np.abs(np.concatenate([np.diff(one)[own] for one in (wheels.left_rad, wheels.right_rad)]))
+        smallest = _smallest(np.diff(np.unique(np.append(steps, 0.0))), _SAME_RAD)
         return 1e3 * streams.vehicle.wheel_radius_m * smallest, "mm"
     if name == "heading" and streams.heading is not None:
         return float(np.degrees(_smallest(np.diff(np.unique(streams.heading.yaw_rad)), _SAME_RAD))), "deg"
@@ -90,11 +96,6 @@ def _resolution(name: StreamName, streams: LogStreams) -> tuple[float, str]:
         lat = _smallest(np.diff(np.unique(streams.fixes.lat_deg)), _SAME_DEG)
         return METRES_PER_DEGREE * lat, "m"
     return np.nan, ""
-
-
-def _across(loose: np.ndarray) -> np.ndarray:
-    """Samples after a reset are bridged with a made-up step."""
-    return np.asarray(loose)
 
 
 def _smallest(steps: Floats, same: float) -> float:

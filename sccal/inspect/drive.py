@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -112,7 +113,7 @@ def drive_facts(together: Together, moved: Motion, track_m: float) -> DriveFacts
         standing_s=float(moved.step_s * moved.standing.sum()),
         standstills=len(stops),
         speed_median_mps=_or_zero(np.median, np.abs(speed[moving])),
-        speed_max_mps=_or_zero(np.max, np.abs(speed[moving])),
+        speed_max_mps=_or_zero(np.max if moved.by_wheels else _high, np.abs(speed[moving])),
         acceleration_max_mps2=_or_zero(_high, change[np.isfinite(change)]),
         braking_max_mps2=_or_zero(_high, -change[np.isfinite(change)]),
         turned_left_rad=float(moved.step_s * turn[turning & (turn > 0)].sum()),
@@ -205,7 +206,7 @@ def _pieces(moved: Motion, speed: Floats, turn: Floats, track_m: float) -> tuple
             straights += abs(one) == 1 and driven >= SHORTEST_STRAIGHT_M
             arcs += abs(one) == 2 and turned >= SMALLEST_TURN_RAD
             pivots += abs(one) == 3 and turned >= SMALLEST_TURN_RAD
-    return straights, arcs, pivots
+    return int(straights), int(arcs), int(pivots)
 
 
 def _sectors(together: Together, moved: Motion, moving: Bools) -> int:
@@ -249,5 +250,5 @@ def _high(values: Floats) -> float:
     return float(np.quantile(values, 0.995))
 
 
-def _or_zero(of: object, values: Floats) -> float:
-    return float(of(values)) if values.size else 0.0  # type: ignore[operator]
+def _or_zero(of: Callable[[Floats], Any], values: Floats) -> float:
+    return float(of(values)) if values.size else 0.0

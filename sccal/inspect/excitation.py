@@ -8,7 +8,7 @@ estimate would have. Where it cannot, the shape of the drive has to answer.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,7 +28,11 @@ from sccal.filter.start import coarse_constants, find_start
 from sccal.inspect.result import DriveFacts, Excited, Shown
 
 NEVER_GATE = 1e3
+ANYWHERE_M, ANY_YAW_RAD = 100.0, 1.0
 WHEEL_RATE_HZ, HEADING_RATE_HZ, FIX_RATE_HZ = 5.0, 2.0, 1.0
+FASTEST_HZ = 20.0
+STEPS_PER_TURN = 4.0
+"""What turns with a wheel shows only where its turns are resolved."""
 MOST_FIXES = 3600
 """More would take longer and show the same: a longer run is looked at in proportion more coarsely."""
 GOOD_SHARE = 0.1
@@ -54,11 +58,12 @@ def typical_noise(aligned: Aligned) -> Noise:
 
 def excited_by_pass(aligned: Aligned) -> tuple[Excited, ...]:
     """The constants, then the effects of the catalogue. Raises DataError where the robot hardly moves."""
-    start = find_start(aligned)
+    # Nothing is known of where the robot starts: a guess would pass for knowledge of the antenna's place.
+    start = replace(find_start(aligned), sigma_position_m=ANYWHERE_M, sigma_yaw_rad=ANY_YAW_RAD)
     first, last = aligned.span_s
     slower = max(1.0, FIX_RATE_HZ * (last - first) / MOST_FIXES)
     timeline = build_timeline(
-        aligned, 0.01, HEADING_RATE_HZ / slower, FIX_RATE_HZ / slower, wheel_rate_hz=WHEEL_RATE_HZ / slower
+        aligned, 0.01, HEADING_RATE_HZ / slower, FIX_RATE_HZ / slower, wheel_rate_hz=_wheel_rate_hz(aligned) / slower
     )
     problem = RunProblem(aligned, timeline, start, typical_noise(aligned), FilterOptions(gate_sigmas=NEVER_GATE))
     at = At(coarse_constants(aligned, start), np.zeros(0))
@@ -77,6 +82,13 @@ def excited_by_pass(aligned: Aligned) -> tuple[Excited, ...]:
     found = score(run.events, run.columns, columns, count, run.model, run.x, run.P, block)
     covariance = reported_covariance(run.finish())
     return (*_constants(covariance, problem), *_effects(asked, found.information[0]))
+
+
+def _wheel_rate_hz(aligned: Aligned) -> float:
+    t_s = np.arange(*aligned.span_s, 1.0)
+    turns = np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.right_rad))) / (2.0 * np.pi)
+    fast = float(np.quantile(turns, 0.9)) if turns.size else 0.0
+    return float(np.clip(STEPS_PER_TURN * fast, WHEEL_RATE_HZ, FASTEST_HZ))
 
 
 def _searched(effect: Effect) -> bool:
@@ -217,4 +229,4 @@ def excited_by_shape(drive: DriveFacts) -> tuple[Excited, ...]:
 
 
 def _distance(drive: DriveFacts) -> float:
-    return drive.distance_wheels_m or drive.distance_fixes_m or 0.0
+    return (drive.distance_fixes_m or 0.0) if drive.distance_wheels_m is None else drive.distance_wheels_m

@@ -12,11 +12,13 @@ from sccal.filter.start import ODD_SCALE
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.place import PlacedFixes
 from sccal.inspect.read import LogStreams
-from sccal.inspect.result import DriveFacts, Finding, FixFacts, StreamFacts, Witness
+from sccal.inspect.result import CourseFacts, DriveFacts, Finding, FixFacts, StreamFacts, Weight, Witness
 from sccal.inspect.together import Together
 from sccal.logs.streams import Notice
 
 COVERED = 0.9
+ODD_COURSE_RAD = np.radians(5.0)
+MISSING = 0.05
 SLOW_HZ = {"wheels": 8.0, "heading": 4.0, "fixes": 0.5}
 COARSE_M = {RTK_FIXED: 0.02, 5: 0.2}
 COARSE_DEG = 0.5
@@ -41,6 +43,7 @@ def findings(
     fixes: FixFacts | None,
     drive: DriveFacts | None,
     seen: Sequence[Witness],
+    course: CourseFacts | None,
     refusal: str,
     doubts: Sequence[Notice],
 ) -> tuple[Finding, ...]:
@@ -53,6 +56,7 @@ def findings(
     # The alignment names the wrong sign itself; where it was not asked, or stopped earlier, the witnesses do.
     if not refusal or together.apart:
         found += [one for witness in seen if (one := _of_sign(witness, streams.declared))]
+    found += _of_course(course)
     if streams.unread:
         found += _apart(together)
     for one in facts:
@@ -88,6 +92,17 @@ def _of_scale(streams: LogStreams, seen: Sequence[Witness]) -> Iterator[Finding]
             )
 
 
+def _of_course(course: CourseFacts | None) -> Iterator[Finding]:
+    if course is None or course.spread_rad < max(ODD_COURSE_RAD, 2.0 * course.expected_rad):
+        return
+    yield Finding(
+        "warning",
+        f"on {course.legs} straight legs the yaw differs from the course of the fixes by {np.degrees(course.spread_rad):.0f}° "
+        "(1σ) beside a constant offset: iron near the compass, a clock that is off, or an AHRS that wanders; "
+        "`sccal diagnose` tells which",
+    )
+
+
 def _of_sign(witness: Witness, declared: bool) -> Finding | None:
     if not witness.clear or witness.slope >= 0.0 or witness.what not in _OTHER_SIGN:
         return None
@@ -115,15 +130,25 @@ def _apart(together: Together) -> Iterator[Finding]:
 
 def _of_stream(one: StreamFacts) -> Iterator[Finding]:
     named = _NAMED[one.name]
+    length = one.last_s - one.first_s
     if one.shares_time and one.covered < COVERED:
+        covers = "covers" if one.name == "heading" else "cover"
         gap = f"; the longest gap is {one.gaps[0].length_s:.1f} s at t = {one.gaps[0].start_s:.1f} s" if one.gaps else ""
-        yield Finding("warning", f"{named} cover {100 * one.covered:.0f} % of the run only{gap}".replace("heading cover", "heading covers"))
+        # A stream that begins late costs its part of the run, and nothing else.
+        weight: Weight = "warning" if one.gap_total_s > (1.0 - COVERED) * length else "note"
+        yield Finding(weight, f"{named} {covers} {100 * one.covered:.0f} % of the run only{gap}")
     elif one.gap_count:
         gap_ = one.gaps[0]
         yield Finding(
             "note",
             f"{one.source}: {one.gap_count} gap{'' if one.gap_count == 1 else 's'}, {one.gap_total_s:.1f} s in all, the "
             f"longest {gap_.length_s:.1f} s at t = {gap_.start_s:.1f} s",
+        )
+    if one.missing > MISSING:
+        yield Finding(
+            "note",
+            f"{one.source}: {100 * one.missing:.0f} % of the rows that {one.rate_hz:.3g} a second would give are missing: "
+            "the logger loses some",
         )
     if one.rate_hz < SLOW_HZ[one.name]:
         yield Finding("note", f"{one.source}: {one.rate_hz:.2g} rows a second are few; log {SLOW_HZ[one.name]:g} or more")

@@ -14,7 +14,7 @@ from sccal.inspect.fixes import fix_facts, range_of
 from sccal.inspect.read import LogStreams, read_streams
 from sccal.inspect.result import ColumnFacts, Excited, Inspection
 from sccal.inspect.together import bring_together
-from sccal.inspect.witnesses import witnesses
+from sccal.inspect.witnesses import course_facts, witnesses
 from sccal.logs.run import RunSource
 from sccal.logs.streams import Notice
 
@@ -32,7 +32,8 @@ def inspect_run(source: RunSource) -> Inspection:
     facts = stream_facts(streams, together)
     moved = motion(together)
     drive = drive_facts(together, moved, 1.0 if streams.vehicle is None else streams.vehicle.track_m)
-    seen = witnesses(together)
+    seen = witnesses(together, streams.vehicle if streams.declared else None)
+    course = course_facts(together)
     fixes = None
     if streams.fixes is not None and together.fixes is not None:
         fixes = fix_facts(streams.fixes, together.fixes, together.span_s)
@@ -53,10 +54,11 @@ def inspect_run(source: RunSource) -> Inspection:
         drive=drive,
         standstill=standstill_facts(together, moved),
         witnesses=seen,
+        course=course,
         columns=_columns(streams),
         excited=excited,
         excited_how=how,
-        findings=findings(streams, together, facts, fixes, drive, seen, refusal, doubts),
+        findings=findings(streams, together, facts, fixes, drive, seen, course, refusal, doubts),
         notices=(*streams.notices, *doubts),
         series=series(together, moved),
     )

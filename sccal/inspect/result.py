@@ -49,7 +49,9 @@ class StreamFacts:
     rate_hz: float
     """One over the median step."""
     jitter_s: float
-    """Half the width of the middle two thirds of the steps between stamps: one standard deviation, if they scatter."""
+    """Half the width of the middle two thirds of what the steps between stamps differ from whole usual steps."""
+    missing: float
+    """Share of the rows that an even rate would have and that are not there, gaps left out."""
     longest_step_s: float
     gaps: tuple[Gap, ...]
     """The longest ones first."""
@@ -165,6 +167,21 @@ class Witness:
     windows: int
     clear: bool
     """False where the drive does not tell."""
+    meaning: str = ""
+    """What would make the two agree."""
+
+
+@dataclass(frozen=True)
+class CourseFacts:
+    """Yaw minus course of the fixes, on straight legs."""
+
+    legs: int
+    offset_rad: float
+    """In (−π, π]: the heading offset, as far as it is one."""
+    spread_rad: float
+    """One standard deviation, robust."""
+    expected_rad: float
+    """What the scatter of the fixes alone makes of it."""
 
 
 @dataclass(frozen=True)
@@ -238,6 +255,7 @@ class Inspection:
     drive: DriveFacts | None
     standstill: StandstillFacts | None
     witnesses: tuple[Witness, ...]
+    course: CourseFacts | None
     columns: tuple[ColumnFacts, ...]
     excited: tuple[Excited, ...]
     excited_how: str

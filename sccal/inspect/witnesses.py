@@ -6,6 +6,8 @@ sign is wrong, and the third shows whose. All three have one rate in common when
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sccal.align.signs import Slope, slope_through_origin
@@ -13,8 +15,9 @@ from sccal.arrays import Floats
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.drive import fix_window_s
 from sccal.inspect.place import PlacedFixes, legs
-from sccal.inspect.result import Witness
+from sccal.inspect.result import CourseFacts, Witness
 from sccal.inspect.together import Together, there
+from sccal.logs.streams import Vehicle
 
 TURN_WINDOW_S = 1.0
 LEAST_TURN_RAD = np.radians(30.0)
@@ -22,15 +25,23 @@ LONGEST_TURN_RAD = 2.5
 """A course that changes by more between two windows is a robot that reversed."""
 LEAST_LEGS = 8
 LEG_FACTOR = 4.0
+COURSE_LEG_M = 3.0
+NEARLY_STRAIGHT_RAD = np.radians(15.0)
+BOTH_SIDES = 0.4
+WANDER_S = 40.0
+"""Time over which the error of a fix usually stays the same."""
 SAME_PATH = 0.9
 """A leg of the fixes much shorter than the wheels' way between its ends went there and back."""
 
 
-def witnesses(together: Together) -> tuple[Witness, ...]:
-    """Every pair of streams that share time."""
+def witnesses(together: Together, vehicle: Vehicle | None) -> tuple[Witness, ...]:
+    """Every pair of streams that share time; the vehicle as it is declared, for what would make them agree."""
     found = []
     if together.meets("wheels", "heading") and together.turn_rad.size:
-        found.append(_turning("yaw against wheels", *_turns(together)))
+        yaw = _turning("yaw against wheels", *_turns(together))
+        if yaw.clear and yaw.slope > 0 and vehicle is not None:
+            yaw = replace(yaw, meaning=_track_that_agrees(together, vehicle.track_m / yaw.slope))
+        found.append(yaw)
     if together.fixes is not None and together.meets("fixes"):
         for name, t_of, turned, what in (
             ("wheels", together.wheel_t_s, together.turn_rad, "course of the fixes against wheels"),
@@ -39,8 +50,55 @@ def witnesses(together: Together) -> tuple[Witness, ...]:
             if together.meets(name) and turned.size:  # type: ignore[arg-type]
                 found.append(_turning(what, *_courses(together.fixes, t_of, turned)))
         if together.meets("wheels"):
-            found.append(_distance(together, together.fixes))
+            distance = _distance(together, together.fixes)
+            if distance.clear and vehicle is not None:
+                radius_m = vehicle.wheel_radius_m * distance.slope
+                distance = replace(distance, meaning=f"a wheel radius of about {radius_m:.4g} m would agree")
+            found.append(distance)
     return tuple(found)
+
+
+def _track_that_agrees(together: Together, track_m: float) -> str:
+    """Empty where the robot turned mostly to one side: then unequal wheels look like another track."""
+    turns = np.diff(together.turn_rad)
+    left, right = float(turns[turns > 0].sum()), -float(turns[turns < 0].sum())
+    both = min(left, right) > BOTH_SIDES * max(left, right)
+    return f"a track of about {track_m:.3g} m would agree" if both else ""
+
+
+def course_facts(together: Together) -> CourseFacts | None:
+    """Does the yaw keep its distance to where the robot goes? None where wheels, yaw and fixes do not share enough straight legs."""
+    fixes = together.fixes
+    if fixes is None or not together.meets("wheels", "heading", "fixes"):
+        return None
+    inside = (fixes.t_s >= together.wheel_t_s[0]) & (fixes.t_s <= together.wheel_t_s[-1])
+    z, t_s = (fixes.east_m + 1j * fixes.north_m)[inside], fixes.t_s[inside]
+    leg_m = max(LEG_FACTOR * fixes.leg_m, COURSE_LEG_M)
+    at = legs(z.real, z.imag, leg_m)
+    if at.size < LEAST_LEGS + 1:
+        return None
+    begin, end = t_s[at][:-1], t_s[at][1:]
+    use = np.ones(begin.size, dtype=np.bool_)
+    for stamps in (together.wheel_t_s, together.yaw_t_s, fixes.t_s):
+        use &= there(begin, end, stamps, longest_step_s(stamps))
+    use &= np.abs(np.diff(np.interp(t_s[at], together.yaw_t_s, together.yaw_rad))) < NEARLY_STRAIGHT_RAD
+    travel = np.diff(np.interp(t_s[at], together.wheel_t_s, together.travel_m))
+    way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(together.travel_m)))))
+    use &= np.abs(travel) >= SAME_PATH * np.diff(np.interp(t_s[at], together.wheel_t_s, way))
+    if use.sum() < LEAST_LEGS:
+        return None
+    # The yaw as it is on the whole of the leg, not only in its middle.
+    grid = begin[:, None] + (end - begin)[:, None] * (np.arange(5) + 0.5) / 5
+    yaw = np.interp(grid, together.yaw_t_s, together.yaw_rad).mean(axis=1)
+    apart = (np.exp(1j * yaw) * np.conj(np.diff(z[at]) * np.sign(travel)))[use]
+    apart /= np.abs(apart)
+    offset = float(np.angle(apart.mean()))
+    spread = 1.4826 * float(np.median(np.abs(np.angle(apart * np.exp(-1j * offset)))))
+    sigma = fixes.sigma_m[np.isfinite(fixes.sigma_m)]
+    wander = float(np.median(sigma)) if sigma.size else 0.0
+    changes2 = wander**2 * (1.0 - np.exp(-float(np.median((end - begin)[use])) / WANDER_S))
+    changes2 += 0.0 if np.isnan(fixes.white_m) else fixes.white_m**2
+    return CourseFacts(int(use.sum()), offset, spread, float(np.sqrt(2.0 * changes2) / leg_m))
 
 
 def _turns(together: Together) -> tuple[Floats, Floats]:
@@ -98,4 +156,4 @@ def _distance(together: Together, fixes: PlacedFixes) -> Witness:
 
 
 def _witness(what: str, slope: Slope, clear: bool) -> Witness:
-    return Witness(what, slope.value, slope.correlation, slope.windows, clear)
+    return Witness(what, float(slope.value), float(slope.correlation), slope.windows, clear)
