@@ -145,7 +145,9 @@ def diagnose_paths(
     return diagnosed, failures
 
 
-def inspect_paths(paths: Sequence[Path], out: Path | None) -> tuple[list[tuple[Inspection, Path | None]], list[Failure]]:
+def inspect_paths(
+    paths: Sequence[Path], out: Path | None
+) -> tuple[list[tuple[Inspection, Path | None]], list[Failure]]:
     """Inspect every run below the paths; with ``out``, a page and JSON for each to out/<run>.
 
     Returns every inspection with its page, and what could not be inspected at all.

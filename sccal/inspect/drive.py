@@ -81,6 +81,8 @@ def motion(together: Together) -> Motion:
         standing = (np.abs(speed) < STANDING_MPS) & (np.nan_to_num(np.abs(wheel_turn)) < STANDING_RADPS)
     else:
         standing = fix_speed < max(STANDING_MPS, 3.0 * FIX_SPEED_SIGMA_MPS)
+        # Turning on the spot moves no antenna; a yaw that drifts is slower than any turn.
+        standing &= ~(np.abs(yaw_turn) > TURNING_RADPS)
     return Motion(t_s, step, speed, wheel_turn, yaw_turn, fix_speed, standing)
 
 
@@ -169,7 +171,7 @@ def series(together: Together, moved: Motion) -> Series:
     return Series(
         t_s=moved.t_s,
         speed_wheels_mps=moved.speed_mps,
-        speed_fixes_mps=moved.fix_speed_mps,
+        speed_fixes_mps=np.where(moved.speed_mps < 0.0, -1.0, 1.0) * moved.fix_speed_mps,
         turn_wheels_radps=moved.wheel_turn_radps,
         turn_yaw_radps=moved.yaw_turn_radps,
         standing_s=standstills(moved),

@@ -37,6 +37,8 @@ MOST_FIXES = 3600
 """More would take longer and show the same: a longer run is looked at in proportion more coarsely."""
 GOOD_SHARE = 0.1
 """Of its prior's sigma: a constant known so well is shown, one known worse is shown weakly."""
+WEAK_SHARE = 0.25
+"""Of an effect's prior: the noise of the heading passes for small turns, which make a straight line show this little."""
 SAME = 0.98
 """Canonical correlation from which on two effects are one."""
 NUISANCE = 0.5
@@ -135,7 +137,7 @@ def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
         own = rows[effect.name]
         sigma = np.sqrt(np.diag(np.linalg.inv(_reduced(scaled, own, small) + np.eye(own.size))))
         least = np.array([one.matters / one.prior_sigma for one in Free(effect).parameters]) + STANDS_OUT * sigma
-        shown: Shown = "yes" if (least <= 1.0).all() else "weak" if (sigma <= UNOBSERVED_RATIO).all() else "no"
+        shown: Shown = "yes" if (least <= 1.0).all() else "weak" if (sigma <= WEAK_SHARE).all() else "no"
         found.append((effect, shown, sigma * prior[own]))
     seen = [effect.name for effect, shown, _ in found if shown != "no"]
     same: dict[str, list[str]] = {name: [] for name in rows}
@@ -191,7 +193,7 @@ class _Rule:
 
 
 def _both_ways(drive: DriveFacts) -> bool:
-    return min(drive.turned_left_rad, drive.turned_right_rad) > TURN_RAD
+    return bool(min(drive.turned_left_rad, drive.turned_right_rad) > TURN_RAD)
 
 
 def _two_speeds(drive: DriveFacts) -> bool:

@@ -12,7 +12,7 @@ from sccal.filter.start import ODD_SCALE
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.place import PlacedFixes
 from sccal.inspect.read import LogStreams
-from sccal.inspect.result import CourseFacts, DriveFacts, Finding, FixFacts, StreamFacts, Weight, Witness
+from sccal.inspect.result import CourseFacts, DriveFacts, Finding, FixFacts, Gap, StreamFacts, Weight, Witness
 from sccal.inspect.together import Together
 from sccal.logs.streams import Notice
 
@@ -55,12 +55,13 @@ def findings(
     found += _of_scale(streams, seen)
     # The alignment names the wrong sign itself; where it was not asked, or stopped earlier, the witnesses do.
     if not refusal or together.apart:
-        found += [one for witness in seen if (one := _of_sign(witness, streams.declared))]
-    found += _of_course(course)
+        found += [wrong for witness in seen if (wrong := _of_sign(witness, streams.declared))]
+    if not refusal:
+        found += _of_course(course)
     if streams.unread:
         found += _apart(together)
     for one in facts:
-        found += _of_stream(one)
+        found += _of_stream(one, together.span_s[0])
     found += _frozen(together)
     found += _of_fixes(fixes, facts)
     found += _of_clock(together)
@@ -97,9 +98,9 @@ def _of_course(course: CourseFacts | None) -> Iterator[Finding]:
         return
     yield Finding(
         "warning",
-        f"on {course.legs} straight legs the yaw differs from the course of the fixes by {np.degrees(course.spread_rad):.0f}° "
-        "(1σ) beside a constant offset: iron near the compass, a clock that is off, or an AHRS that wanders; "
-        "`sccal diagnose` tells which",
+        f"on {course.legs} straight legs the yaw differs from the course of the fixes by "
+        f"{np.degrees(course.spread_rad):.0f}° (1σ) beside a constant offset: iron near the compass, "
+        "a clock that is off, or an AHRS that wanders; `sccal diagnose` tells which",
     )
 
 
@@ -123,37 +124,43 @@ def _apart(together: Together) -> Iterator[Finding]:
         t_s = together.times(name)
         yield Finding(
             "refused",
-            f"{_NAMED[name]} ({t_s[0]:.3f} … {t_s[-1]:.3f} s) share no time with the rest ({first:.3f} … {last:.3f} s): "
-            "all streams must be on the logging computer's clock",
+            f"{_NAMED[name]} ({t_s[0]:.3f} … {t_s[-1]:.3f} s) share no time with the rest ({first:.3f} … "
+            f"{last:.3f} s): all streams must be on the logging computer's clock",
         )
 
 
-def _of_stream(one: StreamFacts) -> Iterator[Finding]:
+def _of_stream(one: StreamFacts, origin_s: float) -> Iterator[Finding]:
     named = _NAMED[one.name]
     length = one.last_s - one.first_s
     if one.shares_time and one.covered < COVERED:
         covers = "covers" if one.name == "heading" else "cover"
-        gap = f"; the longest gap is {one.gaps[0].length_s:.1f} s at t = {one.gaps[0].start_s:.1f} s" if one.gaps else ""
+        gap = f"; the longest gap: {_told(one.gaps[0], origin_s)}" if one.gaps else ""
         # A stream that begins late costs its part of the run, and nothing else.
         weight: Weight = "warning" if one.gap_total_s > (1.0 - COVERED) * length else "note"
         yield Finding(weight, f"{named} {covers} {100 * one.covered:.0f} % of the run only{gap}")
     elif one.gap_count:
-        gap_ = one.gaps[0]
+        gaps = f"{one.gap_count} gaps, {one.gap_total_s:.1f} s in all, the longest" if one.gap_count > 1 else "a gap of"
         yield Finding(
-            "note",
-            f"{one.source}: {one.gap_count} gap{'' if one.gap_count == 1 else 's'}, {one.gap_total_s:.1f} s in all, the "
-            f"longest {gap_.length_s:.1f} s at t = {gap_.start_s:.1f} s",
+            "note", f"{one.source}: {gaps} {_told(one.gaps[0], origin_s if one.shares_time else one.first_s)}"
         )
     if one.missing > MISSING:
         yield Finding(
             "note",
-            f"{one.source}: {100 * one.missing:.0f} % of the rows that {one.rate_hz:.3g} a second would give are missing: "
-            "the logger loses some",
+            f"{one.source}: {100 * one.missing:.0f} % of the rows that {one.rate_hz:.3g} a second would give are "
+            "missing: the logger loses some",
         )
     if one.rate_hz < SLOW_HZ[one.name]:
-        yield Finding("note", f"{one.source}: {one.rate_hz:.2g} rows a second are few; log {SLOW_HZ[one.name]:g} or more")
+        yield Finding(
+            "note", f"{one.source}: {one.rate_hz:.2g} rows a second are few; log {SLOW_HZ[one.name]:g} or more"
+        )
     if one.name == "heading" and np.isfinite(one.resolution) and one.resolution > COARSE_DEG:
-        yield Finding("warning", f"{one.source}: the yaw is logged in steps of {one.resolution:.2g}°; log more decimals")
+        yield Finding(
+            "warning", f"{one.source}: the yaw is logged in steps of {one.resolution:.2g}°; log more decimals"
+        )
+
+
+def _told(gap: Gap, origin_s: float) -> str:
+    return f"{gap.length_s:.1f} s, {gap.start_s - origin_s:.1f} s after the start"
 
 
 def _frozen(together: Together) -> Iterator[Finding]:
@@ -169,8 +176,8 @@ def _frozen(together: Together) -> Iterator[Finding]:
         if end - start > FROZEN_S and moved > max(FROZEN_TRAVEL_M, fixes.leg_m):
             yield Finding(
                 "warning",
-                f"the fixes repeat one position for {end - start:.1f} s from t = {start:.1f} s while the wheels move "
-                f"{moved:.1f} m: the receiver, or its logging, was stuck",
+                f"the fixes repeat one position for {end - start:.1f} s, {start - together.span_s[0]:.1f} s after the "
+                f"start, while the wheels move {moved:.1f} m: the receiver, or its logging, was stuck",
             )
     if together.meets("heading") and together.turn_rad.size:
         turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(together.turn_rad)))))
@@ -179,8 +186,8 @@ def _frozen(together: Together) -> Iterator[Finding]:
         if end - start > FROZEN_S and by > FROZEN_TURN_RAD:
             yield Finding(
                 "warning",
-                f"the yaw repeats one value for {end - start:.1f} s from t = {start:.1f} s while the wheels turn the robot "
-                f"by {np.degrees(by):.0f}°: the AHRS, or its logging, was stuck",
+                f"the yaw repeats one value for {end - start:.1f} s, {start - together.span_s[0]:.1f} s after the "
+                f"start, while the wheels turn the robot by {np.degrees(by):.0f}°: the AHRS, or its logging, was stuck",
             )
 
 
@@ -204,14 +211,15 @@ def _of_fixes(fixes: FixFacts | None, facts: Sequence[StreamFacts]) -> Iterator[
     if limit is not None and np.isfinite(step) and step > limit:
         yield Finding(
             "warning",
-            f"positions are logged in steps of {step:.2g} m, coarser than {best.name} is: log more decimals of latitude "
-            "and longitude (8 of degrees, or 6 of minutes)",
+            f"positions are logged in steps of {step:.2g} m, coarser than {best.name} is: log more decimals of "
+            "latitude and longitude (8 of degrees, or 6 of minutes)",
         )
     total = sum(one.seconds for one in fixes.qualities)
     fixed = sum(one.seconds for one in fixes.qualities if one.code == RTK_FIXED)
     if 0.0 < fixed < (1.0 - POOR_SHARE) * total:
         yield Finding(
-            "note", f"{QUALITY_NAMES[RTK_FIXED]} for {100 * fixed / total:.0f} % of the time; the map shows where it is lost"
+            "note",
+            f"{QUALITY_NAMES[RTK_FIXED]} for {100 * fixed / total:.0f} % of the time; the map shows where it is lost",
         )
     if best.code in (1, 2, 9):
         yield Finding("note", f"fixes are {best.name}: metres, not centimetres; longer drives make up for some of it")
@@ -228,7 +236,9 @@ def _of_clock(together: Together) -> Iterator[Finding]:
             "note", f"NMEA lines arrive with {1e3 * clock.jitter_s:.0f} ms of jitter: stamp them nearer to the receiver"
         )
     if clock.knots > 2:
-        yield Finding("note", "the logging clock was being steered during the run: keep NTP still while logging, or use PTP")
+        yield Finding(
+            "note", "the logging clock was being steered during the run: keep NTP still while logging, or use PTP"
+        )
 
 
 def _of_drive(drive: DriveFacts | None) -> Iterator[Finding]:

@@ -22,7 +22,9 @@ def fix_facts(stream: FixStream, placed: PlacedFixes, span_s: tuple[float, float
     steps = np.diff(placed.t_s, append=placed.t_s[-1:] + usual)
     lasts = np.where(steps > limit, usual, steps)
     shares = [
-        QualityShare(int(code), QUALITY_NAMES.get(int(code), "unknown"), int(n), float(lasts[placed.quality == code].sum()))
+        QualityShare(
+            int(code), QUALITY_NAMES.get(int(code), "unknown"), int(n), float(lasts[placed.quality == code].sum())
+        )
         for code, n in zip(codes, counts, strict=True)
     ]
     sigma = np.sqrt(0.5 * (stream.sigma_east_m**2 + stream.sigma_north_m**2))[placed.row]

@@ -187,7 +187,9 @@ class _Folder:
 
         Raises DataError where there are no fixes to scale by.
         """
-        table = read_table(self.folder / "encoder.csv", (("t", "left_ticks", "right_ticks"), ("t", "left_rad", "right_rad")))
+        table = read_table(
+            self.folder / "encoder.csv", (("t", "left_ticks", "right_ticks"), ("t", "left_rad", "right_rad"))
+        )
         in_ticks = "left_ticks" in table.columns and "right_ticks" in table.columns
         unit = "ticks" if in_ticks else "rad"
         t_s, left, right = (table.columns[name] for name in ("t", f"left_{unit}", f"right_{unit}"))

@@ -228,6 +228,7 @@ class Series:
     t_s: Floats
     speed_wheels_mps: Floats
     speed_fixes_mps: Floats
+    """With the sign of the wheels' speed, where they are there."""
     turn_wheels_radps: Floats
     turn_yaw_radps: Floats
     standing_s: Floats

@@ -25,8 +25,8 @@ LONGEST_TURN_RAD = 2.5
 """A course that changes by more between two windows is a robot that reversed."""
 LEAST_LEGS = 8
 LEG_FACTOR = 4.0
-COURSE_LEG_M = 3.0
-NEARLY_STRAIGHT_RAD = np.radians(15.0)
+COURSE_LEG_M = 2.0
+NEARLY_STRAIGHT_RAD = np.radians(25.0)
 BOTH_SIDES = 0.4
 WANDER_S = 40.0
 """Time over which the error of a fix usually stays the same."""
@@ -67,7 +67,10 @@ def _track_that_agrees(together: Together, track_m: float) -> str:
 
 
 def course_facts(together: Together) -> CourseFacts | None:
-    """Does the yaw keep its distance to where the robot goes? None where wheels, yaw and fixes do not share enough straight legs."""
+    """Does the yaw keep its distance to where the robot goes, on legs that are nearly straight?
+
+    None where wheels, yaw and fixes do not share enough straight legs.
+    """
     fixes = together.fixes
     if fixes is None or not together.meets("wheels", "heading", "fixes"):
         return None
@@ -85,6 +88,7 @@ def course_facts(together: Together) -> CourseFacts | None:
     travel = np.diff(np.interp(t_s[at], together.wheel_t_s, together.travel_m))
     way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(together.travel_m)))))
     use &= np.abs(travel) >= SAME_PATH * np.diff(np.interp(t_s[at], together.wheel_t_s, way))
+    use &= travel != 0.0
     if use.sum() < LEAST_LEGS:
         return None
     # The yaw as it is on the whole of the leg, not only in its middle.

@@ -50,8 +50,9 @@ def inspection_drawings(i: Inspection) -> tuple[Drawing, ...]:
     drawings = [
         Drawing(
             "timeline",
-            "What was logged when: a bar for each stream, white where it has a gap; the quality of the fixes; speed and "
-            "turning by every stream that tells of them, which should lie on each other. Grey: the robot stands.",
+            "What was logged when: a bar for each stream, white where it has a gap; the quality of the fixes; speed "
+            "and turning by every stream that tells of them, which should lie on each other (fixes show no sign: it "
+            "is the wheels'). Grey: the robot stands.",
             timeline(i),
         )
     ]
@@ -67,7 +68,7 @@ def timeline(i: Inspection) -> str:
     s = i.series
     speeds = [
         ("wheels", s.speed_wheels_mps, BLUE),
-        ("fixes (not signed)", s.speed_fixes_mps, ORANGE),
+        ("fixes", s.speed_fixes_mps, ORANGE),
     ]
     turns = [
         ("yaw", np.degrees(s.turn_yaw_radps), VERMILION),
@@ -85,7 +86,11 @@ def timeline(i: Inspection) -> str:
         figure = Figure(figsize=(_WIDE_IN, height))
         panels = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0])
         figure.subplots_adjust(
-            left=0.075, right=0.985, bottom=0.46 / height, top=1.0 - 0.3 / height, hspace=0.42 * len(heights) / height * 1.6
+            left=0.075,
+            right=0.985,
+            bottom=0.46 / height,
+            top=1.0 - 0.3 / height,
+            hspace=0.42 * len(heights) / height * 1.6,
         )
         _bars(panels[0], i)
         for axes, (title, every) in zip(panels[1:], curves, strict=True):
@@ -97,9 +102,7 @@ def timeline(i: Inspection) -> str:
             axes.set_title(title)
             axes.set_ylim(_limits([values for _, values, _ in every]))
             _plain_ticks(axes, 5)
-            axes.legend(
-                loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderaxespad=0.0, borderpad=0.1
-            )
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, borderaxespad=0.0, borderpad=0.1)
         (first, last), label = _elapsed(np.array([start, end]), start, end)
         panels[-1].set_xlim(first, last if last > first else first + 1.0)
         panels[-1].xaxis.set_major_locator(MaxNLocator(12))
@@ -113,12 +116,11 @@ def fix_map(i: Inspection) -> str:
     s = i.series
     with _styled("fix map"):
         figure = Figure(figsize=(_MAP_IN, 5.0))
-        axes = figure.add_axes((0.13, 0.1, 0.84, 0.76))
+        axes = figure.add_axes((0.13, 0.1, 0.84, 0.82))
         for mask, label, colour in _by_quality(s.fix_quality):
             every = _strided(int(mask.sum()), POINTS)
-            axes.plot(
-                s.fix_east_m[mask][every], s.fix_north_m[mask][every], ".", ms=3.0, mew=0, color=colour, label=label
-            )
+            axes.plot(s.fix_east_m[mask][every], s.fix_north_m[mask][every], ".", ms=3.0, mew=0, color=colour)
+            axes.plot([], [], "o", ms=5.0, mew=0, color=colour, label=label)
         ends: dict[str, Any] = {"mec": "white", "mew": 0.8, "ls": "none", "zorder": 5}
         axes.plot(s.fix_east_m[:1], s.fix_north_m[:1], "o", ms=8, color=BLUE, label="start", **ends)
         axes.plot(s.fix_east_m[-1:], s.fix_north_m[-1:], "s", ms=7, color=PURPLE, label="end", **ends)
@@ -134,11 +136,10 @@ def fix_map(i: Inspection) -> str:
 def _bars(axes: Axes, i: Inspection) -> None:
     """A bar for each stream with its gaps, and one for the quality of the fixes below them."""
     start, end = i.span_s
-    names = []
+    names: list[str] = []
     for one in i.streams:
         place = len(names)
-        begin, pieces = _pieces(one, start)
-        time, _ = _elapsed(np.array(pieces), start, end)
+        time, _ = _elapsed(np.array(_pieces(one, start)), start, end)
         axes.broken_barh(
             [(a, b - a) for a, b in time.tolist()], (place - 0.5 * _BAR, _BAR),
             color=BLACK if one.shares_time else GREY, alpha=0.75 if one.shares_time else 0.45, lw=0,
@@ -174,13 +175,13 @@ def _bars(axes: Axes, i: Inspection) -> None:
     axes.set_title("streams")
 
 
-def _pieces(one: StreamFacts, start_s: float) -> tuple[float, list[tuple[float, float]]]:
+def _pieces(one: StreamFacts, start_s: float) -> list[tuple[float, float]]:
     """Stretches between the gaps, a stream on a time of its own moved to the start."""
     shift = _shift(one, start_s)
     ends = sorted((gap.start_s, gap.start_s + gap.length_s) for gap in one.gaps)
     begins = [one.first_s, *(end for _, end in ends)]
     stops = [*(begin for begin, _ in ends), one.last_s]
-    return one.first_s + shift, [(a + shift, b + shift) for a, b in zip(begins, stops, strict=True)]
+    return [(a + shift, b + shift) for a, b in zip(begins, stops, strict=True)]
 
 
 def _shift(one: StreamFacts | None, start_s: float) -> float:

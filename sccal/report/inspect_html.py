@@ -19,7 +19,7 @@ from sccal.report.inspect_lines import (
     run_line,
     sigmas_text,
     standstill_line,
-    stream_cells,
+    stream_rows,
     witness_line,
 )
 from sccal.report.numbers import one_line
@@ -51,7 +51,7 @@ def inspection_html(i: Inspection) -> str:
         title=one_line(i.run),
         sub=run_line(i),
         header=STREAM_HEADER,
-        streams=[stream_cells(one, i) for one in i.streams],
+        streams=stream_rows(i),
         drawings=inspection_drawings(i),
         facts=(
             *zip(("fixes", "receiver"), fixes_lines(i.fixes), strict=False),
@@ -61,7 +61,7 @@ def inspection_html(i: Inspection) -> str:
         ),
         together=[line for line in (*map(witness_line, i.witnesses), course_line(i.course)) if line],
         columns=column_lines(i.columns),
-        excited=[_row(one) for one in i.excited],
+        excited=[_row(one) for shown in _TAGS for one in i.excited if one.shown == shown],
         findings=[(one.weight, _WEIGHTS[one.weight], one_line(one.text)) for one in i.findings],
         notices=warnings_first(i.notices),
         version=__version__,

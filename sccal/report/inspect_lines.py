@@ -18,6 +18,7 @@ from sccal.inspect.result import (
     Shown,
     StandstillFacts,
     StreamFacts,
+    StreamName,
     Witness,
 )
 from sccal.report.numbers import MISSING, duration, one_line, plain, short
@@ -44,10 +45,10 @@ def log_verdict(i: Inspection) -> LogVerdict:
     """The first line: can this log be calibrated?"""
     refusals = [one_line(one.text) for one in i.findings if one.weight == "refused"]
     if refusals:
-        return LogVerdict("doubtful, a calibration would refuse this log", _some(refusals))
+        return LogVerdict("doubtful – a calibration would refuse this log", _some(refusals))
     warnings = [one_line(one.text) for one in i.findings if one.weight == "warning"]
     if warnings:
-        return LogVerdict("partial, a calibration is possible and may be wrong", _some(warnings))
+        return LogVerdict("partial – a calibration is possible and may be wrong", _some(warnings))
     lacking = [one.title for one in i.excited[:3] if one.shown != "yes"]
     if lacking:
         return LogVerdict("partial", (f"this drive shows {_and(lacking)} badly or not at all",))
@@ -133,6 +134,10 @@ def witness_line(w: Witness) -> str:
     """One pair of streams."""
     if not w.clear:
         return f"{w.what}: the drive does not tell"
+    if w.what.startswith("course"):
+        # Courses over windows are rounded off, so the slope is no figure to go by.
+        way = "the same way" if w.slope > 0 else "opposite ways"
+        return f"{w.what}: turn {way}, correlation {plain(w.correlation, 3)}"
     meaning = f"; {w.meaning}" if w.meaning else ""
     return f"{w.what}: slope {plain(w.slope, 3)}, correlation {plain(w.correlation, 3)}{meaning}"
 
@@ -196,7 +201,16 @@ def sigma_text(one: Excited) -> str:
 
 def sigmas_text(one: Excited) -> str:
     """Every expected sigma with its unit: ``forward_m 0.003 m, left_m 0.002 m``."""
-    return ", ".join(f"{name} {plain(sigma, 2)} {one.units[name]}" for name, sigma in one.sigmas.items())
+    units = {name: "" if unit == "1" else f" {unit}" for name, unit in one.units.items()}
+    return ", ".join(f"{name} {plain(sigma, 2)}{units[name]}" for name, sigma in one.sigmas.items())
+
+
+def stream_rows(i: Inspection) -> list[tuple[str, ...]]:
+    """STREAM_HEADER's cells of every stream, those that could not be read included."""
+    there = {one.name: stream_cells(one, i) for one in i.streams}
+    names: tuple[StreamName, ...] = ("wheels", "heading", "fixes")
+    blank = ("-",) * (len(STREAM_HEADER) - 2)
+    return [there.get(name, (name, "not read", *blank)) for name in names]
 
 
 def stream_cells(s: StreamFacts, i: Inspection) -> tuple[str, ...]:
@@ -215,7 +229,7 @@ def stream_cells(s: StreamFacts, i: Inspection) -> tuple[str, ...]:
         f"{_moment(s.first_s - origin)} … {_moment(s.last_s - origin)}" if s.shares_time else "on a time of its own",
         f"{_percent(s.covered)} %" if s.shares_time else "-",
         gap,
-        f"{plain(s.resolution, 2)} {s.resolution_unit}" if math.isfinite(s.resolution) else "-",
+        _step(s),
     )
 
 
@@ -240,11 +254,23 @@ def _moment(seconds: float) -> str:
 def _percent(share: float) -> str:
     """Never rounded up to all."""
     percent = 100.0 * share
-    return "100" if percent >= 99.95 else f"{math.floor(10.0 * percent) / 10.0:.1f}" if percent > 99.0 else f"{percent:.0f}"
+    return (
+        "100"
+        if percent >= 99.95
+        else f"{math.floor(10.0 * percent) / 10.0:.1f}"
+        if percent > 99.0
+        else f"{percent:.0f}"
+    )
 
 
 def _milliseconds(seconds: float) -> str:
     return plain(1e3 * seconds, 2) if seconds >= 5e-5 else "<0.1" if math.isfinite(seconds) else MISSING
+
+
+def _step(s: StreamFacts) -> str:
+    if not math.isfinite(s.resolution):
+        return "-"
+    return _length(s.resolution) if s.resolution_unit == "m" else f"{short(s.resolution, 2)} {s.resolution_unit}"
 
 
 def _brief(seconds: float) -> str:

@@ -17,9 +17,10 @@ from sccal.report.inspect_lines import (
     log_verdict,
     run_line,
     standstill_line,
-    stream_cells,
+    stream_rows,
     witness_line,
 )
+from sccal.report.numbers import one_line
 from sccal.report.summary import notice_text
 from sccal.report.text import _columns, _labelled, _wrapped
 
@@ -52,7 +53,12 @@ def inspection_text(i: Inspection, width: int = 100) -> str:
         lines += ["", *_wrapped(f"What this drive shows, by {i.excited_how}:", width)]
         for shown, texts in excited_lines(i):
             lines += _labelled(_SAYS[shown], texts, width)
-    told = [f"{'' if one.weight == 'note' else f'{one.weight}: '}{one.text}" for one in i.findings]
+    first = log_verdict(i).because
+    told = [
+        f"{'' if one.weight == 'note' else f'{one.weight}: '}{one.text}"
+        for one in i.findings
+        if one_line(one.text) not in first
+    ]
     if told:
         lines += ["", *_labelled("findings", told, width)]
     lines += _notices(i, width)
@@ -60,7 +66,7 @@ def inspection_text(i: Inspection, width: int = 100) -> str:
 
 
 def _streams(i: Inspection, width: int) -> list[str]:
-    rows = [STREAM_HEADER, *(stream_cells(one, i) for one in i.streams)]
+    rows = [STREAM_HEADER, *stream_rows(i)]
     kept = list(range(len(STREAM_HEADER)))
     for column in _LEAST_NEEDED:
         if max(map(len, _columns(_chosen(rows, kept), "<" * len(kept)))) <= width:
