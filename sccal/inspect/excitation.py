@@ -38,7 +38,7 @@ MOST_FIXES = 3600
 GOOD_SHARE = 0.1
 """Of its prior's sigma: a constant known so well is shown, one known worse is shown weakly."""
 WEAK_SHARE = 0.25
-"""Of an effect's prior: the noise of the heading passes for small turns, which make a straight line show this little."""
+"""Of an effect's prior: the noise of the heading passes for small turns, by which a straight line shows a little."""
 SAME = 0.98
 """Canonical correlation from which on two effects are one."""
 NUISANCE = 0.5
@@ -137,9 +137,9 @@ def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
         own = rows[effect.name]
         sigma = np.sqrt(np.diag(np.linalg.inv(_reduced(scaled, own, small) + np.eye(own.size))))
         least = np.array([one.matters / one.prior_sigma for one in Free(effect).parameters]) + STANDS_OUT * sigma
-        shown: Shown = "yes" if (least <= 1.0).all() else "weak" if (sigma <= WEAK_SHARE).all() else "no"
+        shown: Shown = "yes" if (least <= 1.0).all() else "weak" if (sigma <= WEAK_SHARE).any() else "no"
         found.append((effect, shown, sigma * prior[own]))
-    seen = [effect.name for effect, shown, _ in found if shown != "no"]
+    seen = [effect.name for effect, _, sigma in found if (sigma <= UNOBSERVED_RATIO * prior[rows[effect.name]]).all()]
     same: dict[str, list[str]] = {name: [] for name in rows}
     for k, one in enumerate(seen):
         for other in seen[k + 1 :]:
@@ -149,7 +149,7 @@ def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
     excited = []
     for effect, shown, sigma in found:
         names = [one.name for one in Free(effect).parameters]
-        twins = tuple(same[effect.name])
+        twins = () if shown == "no" else tuple(same[effect.name])
         excited.append(
             Excited(
                 name=effect.name,

@@ -12,6 +12,7 @@ from sccal.inspect.result import FixFacts, QualityShare, QualitySpan, Range
 from sccal.logs.streams import FixStream
 
 STRIP_CELLS = 60
+FINE_CELLS = 480
 
 
 def fix_facts(stream: FixStream, placed: PlacedFixes, span_s: tuple[float, float]) -> FixFacts:
@@ -31,7 +32,8 @@ def fix_facts(stream: FixStream, placed: PlacedFixes, span_s: tuple[float, float
     return FixFacts(
         qualities=tuple(sorted(shares, key=lambda one: -one.count)),
         spans=_spans(placed, limit, usual),
-        strip=_strip(placed, span_s, usual),
+        strip=_strip(placed, span_s, usual, STRIP_CELLS),
+        fine_strip=_strip(placed, span_s, usual, FINE_CELLS),
         stated_sigma_m=range_of(sigma),
         stated_share=float(np.isfinite(sigma).mean()) if sigma.size else 0.0,
         satellites=_column(stream, placed, "satellites"),
@@ -69,18 +71,20 @@ def _spans(placed: PlacedFixes, limit_s: float, usual_s: float) -> tuple[Quality
     return tuple(spans)
 
 
-def _strip(placed: PlacedFixes, span_s: tuple[float, float], usual_s: float) -> tuple[int | None, ...]:
+def _strip(placed: PlacedFixes, span_s: tuple[float, float], usual_s: float, cells: int) -> tuple[int | None, ...]:
     """The most frequent quality of each cell; a cell shorter than a step of the fixes takes the fix before it."""
     first, last = span_s
     if placed.t_s.size == 0 or last <= first:
         return ()
     if placed.t_s[-1] < first or placed.t_s[0] > last:
         first, last = float(placed.t_s[0]), float(placed.t_s[-1])
-    width = max(last - first, 1e-9) / STRIP_CELLS
-    cell = np.floor((placed.t_s - first) / width).astype(np.int64).clip(0, STRIP_CELLS - 1)
+    width = max(last - first, 1e-9) / cells
+    cell = np.floor((placed.t_s - first) / width).astype(np.int64).clip(0, cells - 1)
     strip: list[int | None] = []
-    for k in range(STRIP_CELLS):
-        own = placed.quality[cell == k]
+    # The fixes are in order of time, so each cell's stand together.
+    bounds = np.searchsorted(cell, np.arange(cells + 1))
+    for k in range(cells):
+        own = placed.quality[bounds[k] : bounds[k + 1]]
         if own.size:
             codes, counts = np.unique(own, return_counts=True)
             strip.append(int(codes[int(np.argmax(counts))]))

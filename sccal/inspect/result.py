@@ -106,6 +106,8 @@ class FixFacts:
     spans: tuple[QualitySpan, ...]
     strip: tuple[int | None, ...]
     """The most frequent quality in each of STRIP_CELLS equal parts of the run; None where there is no fix."""
+    fine_strip: tuple[int | None, ...]
+    """The same in FINE_CELLS parts, for pictures."""
     stated_sigma_m: Range | None
     stated_share: float
     satellites: Range | None

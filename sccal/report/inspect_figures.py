@@ -20,7 +20,6 @@ from sccal.inspect.result import Inspection, StreamFacts
 from sccal.report.figures import (
     BLACK,
     BLUE,
-    CLOUD_POINTS,
     GREY,
     ORANGE,
     POINTS,
@@ -151,18 +150,14 @@ def _bars(axes: Axes, i: Inspection) -> None:
             )  # fmt: skip
         names.append(one.name)
     if i.fixes is not None and i.fixes.spans:
-        shift = _shift(next((one for one in i.streams if one.name == "fixes"), None), start)
-        shown = set()
-        for span in i.fixes.spans[:SPANS_SHOWN]:
-            if span.code is None:
-                continue
-            time, _ = _elapsed(np.array([span.start_s, span.end_s]) + shift, start, end)
+        pieces = _quality_pieces(i)
+        for code in sorted({code for _, _, code in pieces}):
+            time, _ = _elapsed(np.array([(a, b) for a, b, one in pieces if one == code]), start, end)
             axes.broken_barh(
-                [(float(time[0]), float(time[1] - time[0]))], (len(names) - 0.5 * _BAR, _BAR),
-                color=_colour(span.code), lw=0,
-            )  # fmt: skip
-            shown.add(span.code)
-        handles = [Patch(color=colour, label=label) for _, label, colour in _by_quality(np.array(sorted(shown)))]
+                [(a, b - a) for a, b in time.tolist()], (len(names) - 0.5 * _BAR, _BAR), color=_colour(code), lw=0
+            )
+        shown = sorted({one.code for one in i.fixes.qualities})
+        handles = [Patch(color=colour, label=label) for _, label, colour in _by_quality(np.array(shown))]
         axes.legend(
             handles=handles, loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=5, borderaxespad=0.0, borderpad=0.1
         )
@@ -173,6 +168,29 @@ def _bars(axes: Axes, i: Inspection) -> None:
     axes.grid(axis="y", visible=False)
     axes.spines["left"].set_visible(False)
     axes.set_title("streams")
+
+
+def _quality_pieces(i: Inspection) -> list[tuple[float, float, int]]:
+    """Begin, end and code of each stretch of one quality; of equal parts of the run where there are too many."""
+    fixes = i.fixes
+    assert fixes is not None
+    start, end = i.span_s
+    own = next((one for one in i.streams if one.name == "fixes"), None)
+    shift = _shift(own, start)
+    if len(fixes.spans) <= SPANS_SHOWN:
+        return [(s.start_s + shift, s.end_s + shift, s.code) for s in fixes.spans if s.code is not None]
+    if own is not None and not own.shares_time:
+        end = start + own.last_s - own.first_s
+    width = (end - start) / len(fixes.fine_strip)
+    pieces: list[tuple[float, float, int]] = []
+    for k, code in enumerate(fixes.fine_strip):
+        begin = start + k * width
+        if code is None:
+            continue
+        if pieces and pieces[-1][2] == code and begin - pieces[-1][1] < 0.5 * width:
+            begin = pieces.pop()[0]
+        pieces.append((begin, start + (k + 1) * width, code))
+    return pieces
 
 
 def _pieces(one: StreamFacts, start_s: float) -> list[tuple[float, float]]:
@@ -203,7 +221,7 @@ def _rows(values: Floats) -> Ints:
     """Thinned by extremes, with the first of every stretch of NaN, so that gaps stay gaps."""
     missing = np.isnan(values)
     edges = np.flatnonzero(missing[1:] != missing[:-1])
-    return np.unique(np.concatenate((_kept(values, 2 * CLOUD_POINTS), edges, np.minimum(edges + 1, len(values) - 1))))
+    return np.unique(np.concatenate((_kept(values, POINTS), edges, np.minimum(edges + 1, len(values) - 1))))
 
 
 def _limits(every: Sequence[Floats]) -> tuple[float, float]:

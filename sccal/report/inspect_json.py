@@ -16,7 +16,7 @@ from sccal.report.as_json import Json, _clock, _document, _notices
 from sccal.report.inspect_lines import log_verdict
 
 SCHEMA = "sccal.inspect/1"
-SPANS_TOLD = 2000
+SPANS_TOLD = 500
 
 
 def inspections_json(inspections: Sequence[Inspection], failures: Iterable[tuple[str, str]] = ()) -> Json:
@@ -75,6 +75,7 @@ def _stream(one: StreamFacts) -> Json:
 
 def _fixes(f: FixFacts) -> Json:
     facts: dict[str, Any] = asdict(f)
+    del facts["fine_strip"]
     facts["spans"] = facts["spans"][:SPANS_TOLD]
     facts["spans_left_out"] = max(len(f.spans) - SPANS_TOLD, 0)
     return facts
