@@ -23,6 +23,7 @@ SLOW_HZ = {"wheels": 8.0, "heading": 4.0, "fixes": 0.5}
 COARSE_M = {RTK_FIXED: 0.02, 5: 0.2}
 COARSE_DEG = 0.5
 POOR_SHARE = 0.2
+HARDLY_M = 1.0
 FROZEN_S = 3.0
 FROZEN_TRAVEL_M = 1.0
 FROZEN_TURN_RAD = np.radians(10.0)
@@ -244,6 +245,14 @@ def _of_clock(together: Together) -> Iterator[Finding]:
 def _of_drive(drive: DriveFacts | None) -> Iterator[Finding]:
     if drive is None:
         return
-    distance = drive.distance_wheels_m if drive.distance_wheels_m is not None else drive.distance_fixes_m
-    if distance is not None and distance < 1.0:
+    wheels_m, fixes_m = drive.distance_wheels_m, drive.distance_fixes_m
+    if wheels_m is not None and fixes_m is not None and wheels_m < HARDLY_M < 0.1 * fixes_m:
+        yield Finding(
+            "warning",
+            f"the wheels hardly turn ({wheels_m:.2f} m) while the fixes move {fixes_m:.0f} m: check the encoder and its "
+            "columns",
+        )
+        return
+    distance = wheels_m if wheels_m is not None else fixes_m
+    if distance is not None and distance < HARDLY_M:
         yield Finding("warning", f"the robot hardly moves: {distance:.2f} m in {drive.duration_s:.0f} s")

@@ -278,6 +278,8 @@ def _brief(seconds: float) -> str:
 
 
 def _length(metres: float) -> str:
+    if metres < 1e-5:
+        return "<0.01 mm"
     return f"{plain(1e3 * metres, 2)} mm" if metres < 0.1 else f"{plain(metres, 2)} m"
 
 

@@ -198,6 +198,11 @@ def test_a_robot_that_stands(tmp_path):
     assert found.standstill.seconds > 30.0
 
 
+def test_an_encoder_that_does_not_count(spoilt):
+    rows(spoilt / "encoder.csv", lambda t, row: [row[0], "5", "5"])
+    assert "while the fixes move" in said(inspected(spoilt), "the wheels hardly turn").text
+
+
 def test_a_further_copy_gives_the_same(general_run, general, tmp_path):
     again = inspected(copied(general_run, tmp_path))
     assert again.findings == general.findings
