@@ -249,8 +249,8 @@ def _of_drive(drive: DriveFacts | None) -> Iterator[Finding]:
     if wheels_m is not None and fixes_m is not None and wheels_m < HARDLY_M < 0.1 * fixes_m:
         yield Finding(
             "warning",
-            f"the wheels hardly turn ({wheels_m:.2f} m) while the fixes move {fixes_m:.0f} m: check the encoder and its "
-            "columns",
+            f"the wheels hardly turn ({wheels_m:.2f} m) while the fixes move {fixes_m:.0f} m: check the encoder "
+            "and its columns",
         )
         return
     distance = wheels_m if wheels_m is not None else fixes_m
