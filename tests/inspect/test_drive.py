@@ -22,6 +22,10 @@ def test_distance_and_direction(general):
     assert (general.series.speed_wheels_mps[: int(2 * STANDS_S) - 1] == 0.0).all()
     after = general.series.speed_wheels_mps[int(2 * (STANDS_S + 3.0)) : int(2 * (STANDS_S + 8.0))]
     assert (after < -0.2).all()
+    wheels, fixes = general.series.speed_wheels_mps, general.series.speed_fixes_mps
+    assert drive.reversed_m == pytest.approx(-0.5 * wheels[wheels < 0].sum(), rel=0.02)
+    both = np.isfinite(fixes) & (np.abs(wheels) > 0.2)
+    assert np.quantile(np.abs(fixes[both] - wheels[both]), 0.9) < 0.1
     assert drive.speed_max_mps == pytest.approx(np.nanmax(np.abs(general.series.speed_wheels_mps)))
     assert drive.by == "wheels"
 
@@ -155,6 +159,13 @@ def test_the_heading_offset_has_its_sign(general, spoilt, offset_deg):
     assert np.degrees(course.offset_rad) == pytest.approx(offset_deg, abs=1.0)
     assert course.spread_rad < np.radians(2.0)
     assert course.legs >= 8
+
+
+def test_the_heading_offset_of_a_robot_that_reverses(tmp_path):
+    run = written(tmp_path / "run", "drive.reverse_first_m=40", path="straight", duration_s=90.0)
+    found = inspected(run)
+    assert found.drive.reversed_m > 0.6 * found.drive.distance_wheels_m
+    assert np.degrees(found.course.offset_rad) == pytest.approx(12.5, abs=1.5)
 
 
 def test_a_compass_that_errs_is_noticed(spoilt, general):
