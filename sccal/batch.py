@@ -21,11 +21,14 @@ from sccal.experiments.result import Experiments
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.iterate import RunProblem
 from sccal.filter.start import find_start
+from sccal.inspect.inspect import inspect_run
+from sccal.inspect.result import Inspection
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, find_runs, read_run
 from sccal.logs.streams import Vehicle
 from sccal.report.diagnosis_write import write_diagnosis
 from sccal.report.experiments_write import write_experiments
+from sccal.report.inspect_write import write_inspection
 from sccal.report.write import begin_loading, write_calibration, write_vehicle
 
 
@@ -139,6 +142,31 @@ def experiment_on_paths(
     done = run_experiments(seeds, duration_s, sources, jobs, tell)
     failures += [Failure(one.name, DataError(one.reason)) for one in done.failed]
     return done, write_experiments(done, out), failures
+
+
+def inspect_paths(
+    paths: Sequence[Path], out: Path | None, read: ReadOptions | None = None
+) -> tuple[list[tuple[Inspection, Path | None]], list[Failure]]:
+    """Inspect every run below the paths; with ``out``, a page and JSON for each to out/<run>.
+
+    Returns every inspection with its page, and what could not be inspected at all.
+    """
+    sources, failures = find_runs(paths)
+    if sources:
+        if out is not None:
+            _check_out(out, sources)
+            begin_loading()
+        say_if_compiling()
+    inspected: list[tuple[Inspection, Path | None]] = []
+    for source in sources:
+        try:
+            found = inspect_run(source, read)
+            page = None if out is None else write_inspection(found, out / source.name)
+        except Exception as error:
+            failures.append(Failure(source.name, as_known(error)))
+            continue
+        inspected.append((found, page))
+    return inspected, failures
 
 
 def _identity(vehicle: Vehicle) -> tuple[object, ...]:

@@ -245,6 +245,39 @@ def diagnose(
     _tell_failures(failures, len(failures) + sum(len(diagnosis.runs) for diagnosis, _ in diagnosed))
 
 
+@app.command("inspect")
+@_with_read_options
+def inspect_(
+    paths: Paths,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for a page and JSON of each run.", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+    *,
+    read: ReadOptions,
+) -> None:
+    """What is in the logs below PATHS before anything is estimated, and what their drives can show."""
+    from sccal.batch import inspect_paths
+    from sccal.report.as_json import json_text
+    from sccal.report.inspect_json import inspections_json
+    from sccal.report.inspect_text import inspection_text
+
+    inspected, failures = inspect_paths(paths, out, read)
+    if as_json:
+        failed = [(failure.name, str(failure.error)) for failure in failures]
+        print(json_text(inspections_json([one for one, _ in inspected], failed)), end="")
+    else:
+        for number, (one, page) in enumerate(inspected):
+            print(("\n" if number else "") + inspection_text(one, _width()), end="")
+            if page is not None:
+                print(f"\nreport: {page}")
+    if inspected:
+        for failure in failures:
+            print(f"sccal: {failure.name}: {failure.error}", file=sys.stderr)
+    else:
+        _tell_failures(failures, len(failures))
+
+
 @app.command()
 def simulate(
     out: Annotated[Path, typer.Argument(help="Folder for the run; its name is the run's.", show_default=False)],

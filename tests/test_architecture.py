@@ -21,7 +21,7 @@ FLOORS = (
     {"effects"},
     {"filter"},
     {"calibration"},
-    {"diagnose", "experiments"},
+    {"diagnose", "experiments", "inspect"},
     {"report"},
     {"batch"},
     {"cli"},

@@ -92,7 +92,7 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     Raises:
         DataError: a file is missing or cannot be used.
     """
-    if _is_message_file(source.path) or _is_bag_folder(source.path):
+    if is_message_log(source.path):
         return _read_message_run(source, options or ReadOptions())
     there = [name for name in RUN_FILES if (source.path / name).is_file()]
     missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
@@ -175,6 +175,11 @@ def _root(path: Path) -> Path:
         f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
         f"or a file {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)}"
     )
+
+
+def is_message_log(path: Path) -> bool:
+    """Whether a run's path is a log of messages (a file, or a bag's folder), not a folder of CSV and NMEA files."""
+    return _is_message_file(path) or _is_bag_folder(path)
 
 
 def _is_message_file(path: Path) -> bool:

@@ -55,8 +55,8 @@ def calibration_json(c: Calibration) -> Json:
             "unseen": [_unseen(one) for one in c.unseen],
             "noise": _noise(c.noise),
             "drive": _drive(c.drive),
-            "clock": _clock(c.clock),
-            "notices": _notices(c.notices),
+            "clock": clock_block(c.clock),
+            "notices": notice_blocks(c.notices),
         }
     )
 
@@ -79,7 +79,7 @@ def vehicle_json(v: VehicleCalibration) -> Json:
             "runs": [
                 {"run": c.run, "verdict": str(run_verdict(c)), "parameters": _parameters(c.parameters)} for c in v.runs
             ],
-            "notices": _notices(v.notices),
+            "notices": notice_blocks(v.notices),
         }
     )
 
@@ -194,7 +194,7 @@ def _drive(drive: Drive) -> Json:
     }
 
 
-def _clock(clock: Clock) -> Json:
+def clock_block(clock: Clock) -> Json:
     return {
         "source": clock.source,
         "offset_s": clock.offset_s,
@@ -206,7 +206,7 @@ def _clock(clock: Clock) -> Json:
     }
 
 
-def _notices(notices: Iterable[Notice]) -> list[Json]:
+def notice_blocks(notices: Iterable[Notice]) -> list[Json]:
     return [
         {
             "source": notice.source,

@@ -10,7 +10,7 @@ from typing import Any
 
 from sccal import __version__
 from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
-from sccal.report.as_json import Json, _estimate, _noise, _notices, _parameters, strict_document
+from sccal.report.as_json import Json, _estimate, _noise, _parameters, notice_blocks, strict_document
 
 SCHEMA = "sccal.diagnosis/1"
 
@@ -46,7 +46,7 @@ def diagnosis_json(d: Diagnosis) -> Json:
             "parameters_before": _parameters(d.parameters_before),
             "parameters_after": _parameters(d.parameters_after),
             "noise": [{"run": one.run, **_noise(one.noise)} for one in d.noises],
-            "notices": _notices(d.notices),
+            "notices": notice_blocks(d.notices),
         }
     )
 

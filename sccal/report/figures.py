@@ -133,7 +133,7 @@ def path_map(c: Calibration) -> str:
         every = strided(len(c.trajectory.t_s), POINTS)
         east, north = c.trajectory.east_m[every], c.trajectory.north_m[every]
         axes.plot(east, north, color="#bbbbbb", lw=2.0, label="estimated path")
-        for mask, label, colour in _by_quality(c.fixes.quality):
+        for mask, label, colour in by_quality(c.fixes.quality):
             every = strided(int(mask.sum()), POINTS)
             axes.plot(
                 c.fixes.east_m[mask][every], c.fixes.north_m[mask][every], ".", ms=3.0, mew=0, color=colour, label=label
@@ -325,7 +325,7 @@ def _outage_drawing(outage: Outage) -> Drawing:
     )
 
 
-def _by_quality(quality: Ints) -> list[tuple[Bools, str, str]]:
+def by_quality(quality: Ints) -> list[tuple[Bools, str, str]]:
     groups = [(quality == code, label, colour) for code, label, colour in QUALITIES]
     groups.append((~np.isin(quality, [code for code, _, _ in QUALITIES]), "other quality", PURPLE))
     return [group for group in groups if group[0].any()]

@@ -1,0 +1,272 @@
+"""What an inspection finds: facts about streams, fixes, clock and drive, and what they mean for a calibration.
+
+Times are on the logging clock. What cannot be told, because a stream is missing or too short, is None or NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from sccal.align import Clock
+from sccal.arrays import Floats, Ints
+from sccal.logs.streams import Notice, Vehicle
+
+StreamName = Literal["wheels", "heading", "fixes"]
+Shown = Literal["yes", "weak", "no"]
+Weight = Literal["refused", "warning", "note"]
+
+
+@dataclass(frozen=True)
+class Unread:
+    """Something of the run that could not be read, with the reader's error."""
+
+    what: str
+    """wheels, heading, fixes, vehicle, or run."""
+    why: str
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A pause in a stream."""
+
+    start_s: float
+    length_s: float
+
+
+@dataclass(frozen=True)
+class StreamFacts:
+    """One stream, as it was read."""
+
+    name: StreamName
+    source: str
+    """File name."""
+    rows: int
+    first_s: float
+    last_s: float
+    rate_hz: float
+    """One over the median step."""
+    jitter_s: float
+    """Half the width of the middle two thirds of what the steps between stamps differ from whole usual steps."""
+    missing: float
+    """Share of the rows that an even rate would have and that are not there, gaps left out."""
+    longest_step_s: float
+    gaps: tuple[Gap, ...]
+    """The longest ones first."""
+    gap_count: int
+    gap_total_s: float
+    covered: float
+    """Share of the run's time in which the stream is there."""
+    resolution: float
+    """Smallest step of the values that occurs, in ``resolution_unit``; NaN where all are the same."""
+    resolution_unit: str
+    repaired: int
+    """Rows that the reader dropped or put in order; the notices say which."""
+    shares_time: bool
+    """False where no moment of it lies within the run's reference stream."""
+
+
+@dataclass(frozen=True)
+class QualityShare:
+    """Fixes of one quality."""
+
+    code: int
+    """As in GGA; -1 where not stated."""
+    name: str
+    count: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class QualitySpan:
+    """A stretch of fixes of one quality; code is None where there is none."""
+
+    start_s: float
+    end_s: float
+    code: int | None
+
+
+@dataclass(frozen=True)
+class Range:
+    """Lowest, median and highest value."""
+
+    low: float
+    median: float
+    high: float
+
+
+@dataclass(frozen=True)
+class FixFacts:
+    """What the receiver says about its fixes."""
+
+    qualities: tuple[QualityShare, ...]
+    """Most frequent first."""
+    spans: tuple[QualitySpan, ...]
+    strip: tuple[int | None, ...]
+    """The most frequent quality in each of STRIP_CELLS equal parts of the run; None where there is no fix."""
+    fine_strip: tuple[int | None, ...]
+    """The same in FINE_CELLS parts, for pictures."""
+    stated_sigma_m: Range | None
+    stated_share: float
+    satellites: Range | None
+    hdop: Range | None
+    age_s: Range | None
+    white_m: float
+    """Scatter from fix to fix, m per axis: what remains of their second differences."""
+
+
+@dataclass(frozen=True)
+class DriveFacts:
+    """What the robot did."""
+
+    duration_s: float
+    distance_wheels_m: float | None
+    distance_fixes_m: float | None
+    reversed_m: float | None
+    standing_s: float
+    standstills: int
+    speed_median_mps: float
+    """While it moves."""
+    speed_max_mps: float
+    acceleration_max_mps2: float
+    braking_max_mps2: float
+    turned_left_rad: float
+    turned_right_rad: float
+    turn_rate_median_radps: float
+    """While it turns."""
+    turn_rate_max_radps: float
+    headings: int
+    """Of twelve sectors, those that the robot moved in."""
+    straights: int
+    arcs: int
+    pivots: int
+    by: str
+    """What this rests on: wheels, or fixes where there are no wheels."""
+
+
+@dataclass(frozen=True)
+class StandstillFacts:
+    """What the sensors read while the robot stands: their noise, without any model."""
+
+    stops: int
+    seconds: float
+    fixes_m: float | None
+    """Scatter about the mean of each stop, m per axis."""
+    yaw_rad: float | None
+    gyro_radps: float | None
+    gyro_bias_radps: float | None
+
+
+@dataclass(frozen=True)
+class Witness:
+    """Two streams compared: the slope of the second on the first, through the origin."""
+
+    what: str
+    slope: float
+    correlation: float
+    windows: int
+    clear: bool
+    """False where the drive does not tell."""
+    meaning: str = ""
+    """What would make the two agree."""
+
+
+@dataclass(frozen=True)
+class CourseFacts:
+    """Yaw minus course of the fixes, on straight legs."""
+
+    legs: int
+    offset_rad: float
+    """In (−π, π]: the heading offset, as far as it is one."""
+    spread_rad: float
+    """One standard deviation, robust."""
+    expected_rad: float
+    """What the scatter of the fixes alone makes of it."""
+
+
+@dataclass(frozen=True)
+class ColumnFacts:
+    """A further column of a file: a candidate cause."""
+
+    source: str
+    name: str
+    values: Range
+    varies: bool
+    missing: float
+    """Share of the rows without a value."""
+
+
+@dataclass(frozen=True)
+class Excited:
+    """Whether this drive shows something."""
+
+    name: str
+    title: str
+    shown: Shown
+    advice: str
+    """What to drive where it is not shown well."""
+    sigmas: Mapping[str, float]
+    """Expected standard deviations by parameter, at typical noise; empty where only geometry was asked."""
+    units: Mapping[str, str]
+    same_as: tuple[str, ...] = ()
+    """Effects that look the same on this drive."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something to act on."""
+
+    weight: Weight
+    """refused: a calibration is impossible; warning: it may be wrong; note: it could be better."""
+    text: str
+
+
+@dataclass(frozen=True)
+class Series:
+    """What the timeline shows: rates on a common grid (n,), NaN where unknown."""
+
+    t_s: Floats
+    speed_wheels_mps: Floats
+    speed_fixes_mps: Floats
+    """With the sign of the wheels' speed, where they are there."""
+    turn_wheels_radps: Floats
+    turn_yaw_radps: Floats
+    standing_s: Floats
+    """(k, 2) start and end of each standstill."""
+    fix_east_m: Floats
+    """(f,) the fixes in a tangent plane of their own."""
+    fix_north_m: Floats
+    fix_quality: Ints
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """One log, inspected."""
+
+    run: str
+    path: Path
+    vehicle: Vehicle | None
+    declared: bool
+    """False where there is no usable vehicle.toml, and the wheels were scaled by the fixes."""
+    unread: tuple[Unread, ...]
+    span_s: tuple[float, float]
+    streams: tuple[StreamFacts, ...]
+    fixes: FixFacts | None
+    clock: Clock | None
+    drive: DriveFacts | None
+    standstill: StandstillFacts | None
+    witnesses: tuple[Witness, ...]
+    course: CourseFacts | None
+    columns: tuple[ColumnFacts, ...]
+    excited: tuple[Excited, ...]
+    excited_how: str
+    findings: tuple[Finding, ...]
+    notices: tuple[Notice, ...]
+    series: Series
+
+    @property
+    def refused(self) -> bool:
+        """Whether a calibration of this log is impossible."""
+        return any(one.weight == "refused" for one in self.findings)
