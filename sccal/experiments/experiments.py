@@ -16,13 +16,12 @@ from sccal.arrays import Floats
 from sccal.calibration.result import Parameters
 from sccal.calibration.single import calibrate_run
 from sccal.errors import SccalError
-from sccal.experiments.plan import EXPERIMENTS, PATHS, VARIANTS, Experiment, Variant, robot
+from sccal.experiments.plan import EXPERIMENTS, PATHS, TOLERANCE_PERCENT, VARIANTS, Experiment, Variant, robot
 from sccal.experiments.result import Cell, Experiments, Failed, Spread, VariantFigures
 from sccal.experiments.trial import Trial, default_options, measured_truth, simulated_trials, try_run
 from sccal.logs.run import RunSource, read_run
 from sccal.simulate.settings import PathName
 
-TOLERANCE_PERCENT = 1.0
 MEASURED_SEEDS = 3
 """At most: a measured drive is the same each time, only the noise put into it differs."""
 CLEAR_SIGMAS = 3.0
@@ -197,4 +196,4 @@ def _why_not(errors_percent: Floats, sigmas_percent: Floats) -> str:
         if (apart <= CLEAR_SIGMAS).all()
         else f"up to {apart.max():.1f} of their own sigmas off"
     )
-    return f"{' and '.join(worst)}: this drive and these fixes give ± {claimed:.2g} %; {allowed}"
+    return f"{', '.join(worst)}: this drive and these fixes give ± {claimed:.2g} %; {allowed}"

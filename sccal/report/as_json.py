@@ -195,6 +195,7 @@ def _drive(drive: Drive) -> Json:
 
 
 def clock_block(clock: Clock) -> Json:
+    """How the clocks were brought together."""
     return {
         "source": clock.source,
         "offset_s": clock.offset_s,
@@ -207,6 +208,7 @@ def clock_block(clock: Clock) -> Json:
 
 
 def notice_blocks(notices: Iterable[Notice]) -> list[Json]:
+    """Every notice with its count and place."""
     return [
         {
             "source": notice.source,

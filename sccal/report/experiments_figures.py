@@ -18,8 +18,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from sccal.arrays import Bools, Floats
-from sccal.experiments.experiments import TOLERANCE_PERCENT
-from sccal.experiments.plan import VARIANTS, Variant
+from sccal.experiments.plan import TOLERANCE_PERCENT, VARIANTS, Variant
 from sccal.experiments.result import Cell, Experiments
 from sccal.experiments.trial import Trial
 from sccal.report.experiments_text import lines_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sccal import __version__
-from sccal.experiments.experiments import TOLERANCE_PERCENT
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
+from sccal.experiments.plan import TOLERANCE_PERCENT
 from sccal.experiments.result import PARAMETERS, Cell, Experiments
 from sccal.report.experiments_figures import WORDS, cell_drawings, overview_drawing
 from sccal.report.experiments_text import (

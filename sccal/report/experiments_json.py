@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 from sccal import __version__
-from sccal.experiments.experiments import TOLERANCE_PERCENT
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
-from sccal.experiments.plan import VARIANTS
+from sccal.experiments.plan import TOLERANCE_PERCENT, VARIANTS
 from sccal.experiments.result import PARAMETERS, Cell, Experiments, Spread, VariantFigures
 from sccal.report.as_json import Json, strict_document, variant_key
 

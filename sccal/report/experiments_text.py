@@ -9,9 +9,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sccal.experiments.experiments import TOLERANCE_PERCENT
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
-from sccal.experiments.plan import FIXES_FIRST_S, LOSS, Experiment
+from sccal.experiments.plan import FIXES_FIRST_S, LOSS, TOLERANCE_PERCENT, Experiment
 from sccal.experiments.result import Cell, Experiments, Spread
 from sccal.report.numbers import duration, one_line, plain, short
 from sccal.report.text import in_columns, labelled, shortened, wrapped

@@ -326,6 +326,7 @@ def _outage_drawing(outage: Outage) -> Drawing:
 
 
 def by_quality(quality: Ints) -> list[tuple[Bools, str, str]]:
+    """Rows of each GGA quality that is there (n,), with its name and colour."""
     groups = [(quality == code, label, colour) for code, label, colour in QUALITIES]
     groups.append((~np.isin(quality, [code for code, _, _ in QUALITIES]), "other quality", PURPLE))
     return [group for group in groups if group[0].any()]
