@@ -62,12 +62,17 @@ def _chunks(t_s: Floats) -> list[Ints]:
     return [np.flatnonzero(number == k) for k in np.unique(number)]
 
 
+def _sampled(t_s: Floats, sample_t_s: Floats) -> Bools:
+    """Between which of the times (n,) a stream has samples (n − 1,); inside a gap it only seems to move evenly."""
+    return np.asarray(np.diff(np.interp(t_s, sample_t_s, np.arange(sample_t_s.size))) > 0.5)
+
+
 def _yaw_against_wheels(aligned: Aligned) -> list[Notice]:
     start, end = aligned.span_s
     t_s = np.arange(start, min(end, aligned.heading_t_s[-1]))
     wheels = np.diff(wheel_turn(aligned, t_s))
     yaw = np.diff(np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad))
-    watched = np.diff(np.interp(t_s, aligned.heading_t_s, np.arange(aligned.heading_t_s.size))) > 0.5
+    watched = _sampled(t_s, aligned.heading_t_s) & _sampled(t_s, aligned.wheel_t_s)
     clear = watched & ((np.abs(wheels) > CLEAR_TURN_RAD) | (np.abs(yaw) > CLEAR_TURN_RAD))
     apart: list[float] = []
     judged = 0
@@ -109,7 +114,7 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
 
     moved = by_wheels(0.0)
     by_fixes = np.abs(np.diff(np.interp(t_s, wheel_t_s, antenna) + _settled(left, fix_t_s, t_s)))
-    watched = np.diff(np.interp(t_s, fix_t_s, np.arange(rows.size))) > 0.5
+    watched = _sampled(t_s, fix_t_s) & _sampled(t_s, aligned.wheel_t_s)
     chunks = [part[watched[part]] for part in _chunks(t_s[:-1])]
     chunks = [part for part in chunks if part.size * window_s > 0.5 * CHUNK_S]
     sigma = _spread(by_fixes - moved, left, fix_t_s, t_s, chunks)

@@ -121,3 +121,21 @@ def test_wheels_that_stand_still_for_a_minute_are_told(noisy):
         "move together" in d
         for d in doubts(replace(noisy, wheels=replace(noisy.wheels, left_rad=left, right_rad=right)))
     )
+
+
+def test_a_gap_in_the_encoder_is_no_disagreement(run):
+    """Across a gap the cumulative angle only seems to grow evenly; the other streams must not be doubted for it."""
+    wheels = run.wheels
+    first = float(wheels.t_s[0]) + 100.0
+    kept = (wheels.t_s < first) | (wheels.t_s > first + 60.0)
+    loose = wheels.loose[kept].copy()
+    loose[np.searchsorted(wheels.t_s[kept], first + 60.0)] = True
+    gap = replace(
+        wheels,
+        t_s=wheels.t_s[kept],
+        left_rad=wheels.left_rad[kept],
+        right_rad=wheels.right_rad[kept],
+        loose=loose,
+        extras={},
+    )
+    assert [d for d in doubts(replace(run, wheels=gap)) if "together" in d] == []
