@@ -79,7 +79,10 @@ def _each(tasks: list[Callable[[], list[Outcome]]], workers: int) -> Iterable[li
 
 
 def _simulated(path: PathName, seed: int, duration_s: float) -> list[Outcome]:
-    return [*simulated_trials(robot(path, seed, duration_s), EXPERIMENTS, default_options())]
+    try:
+        return [*simulated_trials(robot(path, seed, duration_s), EXPERIMENTS, default_options())]
+    except SccalError as error:
+        return [Failed(f"{path}, seed {seed}", str(error)) for _ in EXPERIMENTS]
 
 
 def _measured(source: RunSource, seed: int) -> list[Outcome]:

@@ -98,7 +98,7 @@ def find_start(aligned: Aligned) -> Start:
         if until >= last:
             break
         length *= GROWTH
-    if fit is None or fit.spread_m < HARDLY_M or fit.sigma_angle > UNSURE_RAD:
+    if fit is None or fit.reach_m < HARDLY_M or fit.sigma_angle > UNSURE_RAD:
         total = float(np.abs(np.diff(travel)).sum())
         raise DataError(
             f"the robot hardly moves, or the fixes do not follow it: the wheels travel {total:.2f} m in "
@@ -158,7 +158,9 @@ class _Similarity:
     fix_mean: complex
     rms_m: float
     spread_m: float
-    """Of the path as the fixes show it."""
+    """Of the path as the fixes show it, each as far as it is trusted."""
+    reach_m: float
+    """The same with all fixes alike: good ones may all be from before the robot moved."""
     sigma_angle: float
 
 
@@ -183,4 +185,6 @@ def _similarity(path: Complexes, fixes: Complexes, sigma_m: Floats, t_s: Floats)
     # The scatter tells; what the receiver states, or a table for it, counts only where the scatter cannot: few fixes.
     noise = max(rms, float(np.sqrt(1.0 / base.mean())) / path.size, PHASE_CENTRE_M)
     moved = abs(alpha) * spread
-    return _Similarity(alpha, path_mean, fix_mean, rms, moved, noise / (max(moved, 1e-6) * math.sqrt(independent)))
+    reach = abs(alpha) * float(np.std(path))
+    sigma = noise / (max(moved, 1e-6) * math.sqrt(independent))
+    return _Similarity(alpha, path_mean, fix_mean, rms, moved, reach, sigma)

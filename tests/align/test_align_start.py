@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from sccal.align import align
+from sccal.degrade.faults import Faults, fault_run
 from sccal.errors import DataError
 from sccal.filter.start import Constants, coarse_constants, find_start, first_constants
 from sccal.simulate.sensors import origin
+from tests.runs import read, written
 
 DRIVES = {
     "forwards": {"path": "rectangle"},
@@ -145,3 +147,12 @@ def test_a_track_far_off_shows_in_the_turning(simulate, streams, nominal_m):
 def test_a_straight_drive_keeps_the_nominal_track(simulate, streams):
     aligned = align(streams(simulate(path="straight"), track_m=0.5))
     assert coarse_constants(aligned, find_start(aligned)).track_m == 0.5
+
+
+def test_good_fixes_at_a_standstill_and_coarse_ones_on_the_way_are_enough(tmp_path):
+    """Trusted fixes hold the robot at one place while it stands; that it moved later is not theirs to show."""
+    run = read(written(tmp_path / "run", "drive.stand_first_s=30", duration_s=180.0))
+    coarse, _ = fault_run(run, Faults(sigma_m=5.0, from_s=25.0))
+    assert set(coarse.fixes.quality.tolist()) == {1, 4}
+    start = find_start(align(coarse))
+    assert abs(np.degrees(start.offset_rad) - 12.5) < 4.0 * np.degrees(start.sigma_yaw_rad)
