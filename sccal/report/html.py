@@ -58,7 +58,7 @@ def run_html(c: Calibration) -> str:
         drawings=run_drawings(c),
         fit=(
             *_fit_facts(c.fit, c.outage),
-            *(("losses", line) for line in reference_lines(c.against_reference)),
+            *(("judged", line) for line in reference_lines(c.against_reference)),
             ("unseen", unseen_line(c.unseen)),
         ),
         noise=(*noise_facts(c.noise), ("clock", clock_line(c.clock))),

@@ -49,7 +49,7 @@ def run_text(c: Calibration, width: int = 100) -> str:
         *labelled("heading", [headings_line(c.fit)], width),
         *labelled("filter", [recoveries_line(c.fit)], width),
         *labelled("outage", [outage_line(c.outage)], width),
-        *labelled("losses", reference_lines(c.against_reference), width),
+        *labelled("judged", reference_lines(c.against_reference), width),
         *labelled("unseen", [unseen_line(c.unseen)], width),
         *labelled("noise", _noise(c.noise), width),
         *labelled("clock", [clock_line(c.clock)], width),
@@ -78,19 +78,18 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
         *labelled("heading", [headings_line(v.fit)], width),
         *labelled("filter", [recoveries_line(v.fit)], width),
         *labelled("outage", [outage_line(v.outage)], width),
-        *labelled(
-            "losses",
-            [
-                f"{shortened(one_line(c.run), 40)}: {line}"
-                for c in v.runs
-                for line in reference_lines(c.against_reference)
-            ],
-            width,
-        ),
+        *labelled("judged", _judged_runs(v.runs), width),
         *labelled("unseen", [unseen_line(unseen_in_all([c.unseen for c in v.runs]))], width),
         *labelled("notices", notice_lines(notices, "the runs' calibration.json"), width),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _judged_runs(runs: Sequence[Calibration]) -> list[str]:
+    lines = [f"{shortened(one_line(c.run), 40)}: {line}" for c in runs for line in reference_lines(c.against_reference)]
+    if len(lines) > REASONS_SHOWN:
+        lines[REASONS_SHOWN:] = [f"… and {len(lines) - REASONS_SHOWN} more in the runs' calibration.json"]
+    return lines
 
 
 def _parameter_table(rows: Sequence[Row], width: int) -> list[str]:
