@@ -131,6 +131,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     if moved is not None:
         notices += moved.notices
         t_s, before_t_s, clock = moved.moved(t_s), moved.moved(before_t_s), moved.after(clock)
+    clock = replace(clock, offset_at_start_s=_offset_at_start_s(t_s, fixes.utc_s))
     require_overlap(t_s[timed], span, clock, "the fixes")
 
     good = timed & usable(fixes.quality)
@@ -202,6 +203,15 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
+
+
+def _offset_at_start_s(t_s: Floats, utc_s: Floats) -> float | None:
+    """Logging clock minus UTC at the first fix that has both."""
+    both = np.flatnonzero(np.isfinite(t_s) & np.isfinite(utc_s))
+    if both.size == 0:
+        return None
+    first = both[int(np.argmin(utc_s[both]))]
+    return float(t_s[first] - utc_s[first])
 
 
 def _clocks_by_motion(

@@ -44,6 +44,8 @@ class Clock:
     sigma_offset_s: float = 0.0
     """Standard deviations of offset and skew; 0 where they are not estimated but taken as logged."""
     sigma_skew_ppm: float = 0.0
+    offset_at_start_s: float | None = None
+    """Logging clock minus UTC at the first fix; None where the log has no UTC."""
 
 
 def fixes_on_host_clock(

@@ -202,6 +202,7 @@ def clock_block(clock: Clock) -> Json:
         "sigma_offset_s": clock.sigma_offset_s,
         "skew_ppm": clock.skew_ppm,
         "sigma_skew_ppm": clock.sigma_skew_ppm,
+        "offset_at_start_s": clock.offset_at_start_s,
         "jitter_s": clock.jitter_s,
         "knots": clock.knots,
     }

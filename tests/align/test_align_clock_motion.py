@@ -181,3 +181,12 @@ def test_dates_of_another_gps_era_are_put_right(drive, receive_times):
     aligned = align(replace(run, fixes=replace(run.fixes, utc_s=run.fixes.utc_s - era_s)))
     assert aligned.clock.offset_s == pytest.approx(era_s, abs=0.03)
     assert any("1024 weeks in the past" in notice.what for notice in aligned.notices)
+
+
+def test_the_offset_is_told_at_the_start_too(drive):
+    """With skew an offset means nothing without its moment: at the median fix, and at the first."""
+    run, _ = off(drive(), 97.0, 200.0)
+    aligned = align(run)
+    clock, half_s = aligned.clock, 0.5 * float(np.ptp(run.fixes.utc_s))
+    assert clock.offset_at_start_s == pytest.approx(clock.offset_s - 1e-6 * clock.skew_ppm * half_s, abs=1e-3)
+    assert clock.offset_s - clock.offset_at_start_s > 0.01
