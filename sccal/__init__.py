@@ -13,9 +13,11 @@ Conventions, valid everywhere in this package
 
 Rooms, ground floor first; imports point down only
 --------------------------------------------------
-errors · geodesy · logs (bytes to streams) · align (streams to one timeline of events) · filter (the compiled kernel,
-the forward filter, the noise) · calibration (one run, several runs, outages) · simulate · report (text, json, yaml,
-figures, html; computes nothing) · cli (parse, call, print, exit code)
+errors · geodesy · randomness · logs (bytes to streams, and back) · align (streams to one timeline of events), simulate
+and degrade (logs with known truth, logs with a fault) · effects (one file each) · filter (the compiled kernel, the forward
+filter, the noise) · calibration (one run, several runs, outages) · diagnose (what the model lacks), experiments (the
+paper's), inspect (what is in a log) · report (text, json, yaml, figures, html; computes nothing) · batch · cli (parse,
+call, print, exit code)
 
 The model is that of L. Cantelli, S. Ligama, G. Muscato, D. Spina, "Auto-Calibration Methods of Kinematic Parameters
 and Magnetometer Offset for the Localization of a Tracked Mobile Robot", Robotics 2016, 5(4), 23.
