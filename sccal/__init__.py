@@ -14,7 +14,7 @@ Conventions, valid everywhere in this package
 Rooms, ground floor first; imports point down only
 --------------------------------------------------
 errors · geodesy · randomness · logs (bytes to streams, and back) · align (streams to one timeline of events), simulate
-and degrade (logs with known truth, logs with a fault) · effects (one file each) · filter (the compiled kernel, the forward
+and degrade (logs with known truth, or a fault) · effects (one file each) · filter (the compiled kernel, the forward
 filter, the noise) · calibration (one run, several runs, outages) · diagnose (what the model lacks), experiments (the
 paper's), inspect (what is in a log) · report (text, json, yaml, figures, html; computes nothing) · batch · cli (parse,
 call, print, exit code)
