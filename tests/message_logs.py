@@ -243,11 +243,17 @@ def write_db3(messages: Iterable[Message], folder: Path) -> Path:
     return folder
 
 
-def as_ros1(type_name: str, raw: bytes) -> bytes:
-    """One message as ROS 1 writes it."""
+@functools.cache
+def typestore(name: str) -> Any:
+    """One of rosbags' stores: it compiles a type when it first meets it."""
     from rosbags.typesys import Stores, get_typestore
 
-    ours, theirs = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS1_NOETIC)
+    return get_typestore(Stores[name])
+
+
+def as_ros1(type_name: str, raw: bytes) -> bytes:
+    """One message as ROS 1 writes it."""
+    ours, theirs = typestore("ROS2_HUMBLE"), typestore("ROS1_NOETIC")
 
     def converted(value: Any) -> Any:
         if not hasattr(value, "__msgtype__"):
@@ -262,17 +268,14 @@ def as_ros1(type_name: str, raw: bytes) -> bytes:
 
 def ros1_definition(type_name: str) -> str:
     """A type's definition as ROS 1 logs it."""
-    from rosbags.typesys import Stores, get_typestore
-
-    return str(get_typestore(Stores.ROS1_NOETIC).generate_msgdef(type_name)[0])
+    return str(typestore("ROS1_NOETIC").generate_msgdef(type_name)[0])
 
 
 def write_ros1(messages: Iterable[Message], path: Path) -> Path:
     """The same messages as a ROS 1 bag."""
     from rosbags.rosbag1 import Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    theirs = get_typestore(Stores.ROS1_NOETIC)
+    theirs = typestore("ROS1_NOETIC")
     with Writer(path) as writer:
         connections: dict[str, Any] = {}
         for topic, type_name, ns, raw in messages:
