@@ -61,6 +61,8 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
 _STAMPS = ("header.stamp", "stamp", "timestamp", "header.timestamp", "time")
 _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos", "nanosecs", "nanoseconds")
+STAMPED = "stamped"
+"""Column of sentences: 1 where the message has a stamp of its own."""
 _NO_CAUSE = re.compile(
     "(geometry|nav|tf2|visualization|map|trajectory|shape|stereo|diagnostic|statistics|action|actionlib|lifecycle"
     "|foxglove|rosgraph)_msgs|tf|foxglove|rcl_interfaces|builtin_interfaces"
@@ -184,8 +186,13 @@ class Topics:
         self.sinks.setdefault(channel.topic, []).append(sink)
         return sink
 
-    def messages(self, source: str, time: TimeSource) -> tuple[dict[str, Messages], list[Notice]]:
-        """The messages of every topic that was opened and has any, and what could not be read."""
+    def messages(
+        self, source: str, time: TimeSource, log_ahead_ns: int = 0
+    ) -> tuple[dict[str, Messages], list[Notice]]:
+        """The messages of every topic that was opened and has any, and what could not be read.
+
+        ``log_ahead_ns`` is how far the log times are ahead of the logging computer's clock (see mcap_tables).
+        """
         found: dict[str, Messages] = {}
         notices = [
             Notice(source, f"topics not read: {topic}: {why}", 1, severity="warning")
@@ -196,7 +203,7 @@ class Topics:
             own = [s for s, kind in zip(sinks, kinds, strict=True) if kind == kinds[0] and not s.given_up]
             if not own:
                 continue
-            messages = _collected(topic, kinds[0], own, f"{source} {topic}", time, notices)
+            messages = _collected(topic, kinds[0], own, f"{source} {topic}", time, notices, log_ahead_ns)
             if messages.t_s.size:
                 found[topic] = messages
         return found, notices
@@ -274,7 +281,13 @@ def _stamp(by_name: Mapping[str, str]) -> tuple[str, str] | None:
 
 
 def _collected(
-    topic: str, kind: str, sinks: Sequence[ChannelSink], source: str, time: TimeSource, notices: list[Notice]
+    topic: str,
+    kind: str,
+    sinks: Sequence[ChannelSink],
+    source: str,
+    time: TimeSource,
+    notices: list[Notice],
+    log_ahead_ns: int,
 ) -> Messages:
     """The columns of one topic's channels, joined and in order of log time."""
     count = sum(sink.count for sink in sinks)
@@ -303,10 +316,12 @@ def _collected(
         first += sink.count
     log_ns = np.concatenate([ns for sink in sinks for ns in sink.log_ns] or [np.zeros(0, dtype=np.int64)])
     publish_ns = np.concatenate([ns for sink in sinks for ns in sink.publish_ns] or [np.zeros(0, dtype=np.int64)])
-    chosen_ns = log_ns if time == "log" else publish_ns if time == "publish" else stamp_ns
+    chosen_ns = (log_ns if time == "log" else publish_ns) - log_ahead_ns if time != "header" else stamp_ns
     if time == "header":
         unset = stamp_ns == 0
-        chosen_ns = np.where(unset, np.where(log_ns != 0, log_ns, publish_ns), stamp_ns)
+        chosen_ns = np.where(unset, np.where(log_ns != 0, log_ns, publish_ns) - log_ahead_ns, stamp_ns)
+        if kind == "Sentence":
+            values[STAMPED] = np.where(unset, 0.0, 1.0)
         if unset.any() and not unset.all():
             where = f"message {int(np.flatnonzero(unset)[0]) + 1}"
             notices.append(

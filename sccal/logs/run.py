@@ -52,7 +52,7 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     seen: set[Path] = set()
     for path in paths:
         root = _root(path)
-        places = [path] if _is_message_file(path) else _run_places(root)
+        places = [path] if is_message_file(path) else _run_places(root)
         sources = [
             RunSource(_name_below(root, place), place, _nearest_vehicle(_folder_of(place), root), root)
             for place in sorted(places, key=lambda place: _natural(place.relative_to(root)))
@@ -92,7 +92,7 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     Raises:
         DataError: a file is missing or cannot be used.
     """
-    if _is_message_file(source.path) or _is_bag_folder(source.path):
+    if is_message_file(source.path) or is_bag_folder(source.path):
         return _read_message_run(source, options or ReadOptions())
     there = [name for name in RUN_FILES if (source.path / name).is_file()]
     missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
@@ -104,7 +104,7 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
         raise DataError(
             f"{source.path}: lacks {', '.join(missing)}; found {', '.join(there) or 'none of the run files'}"
         )
-    vehicle, notices = read_vehicle(_vehicle_toml(source))
+    vehicle, notices = read_vehicle(vehicle_of(source))
     wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)
     _require_rows(source.path / "encoder.csv", wheels.t_s.size, wheel_notices)
     heading, heading_notices = _read_heading(source.path, there)
@@ -142,14 +142,16 @@ def _read_heading(folder: Path, there: Sequence[str]) -> tuple[HeadingStream, tu
 
 
 def _read_message_run(source: RunSource, options: ReadOptions) -> Run:
-    vehicle, notices = read_vehicle(_vehicle_toml(source))
+    vehicle, notices = read_vehicle(vehicle_of(source))
     wheels, heading, fixes, found = read_message_log(source.path, vehicle, options)
     for what, count in (("wheels", wheels.t_s), ("heading", heading.t_s), ("fixes", fixes.lat_deg)):
         _require_rows(f"{source.path} ({what})", count.size, found)
-    return Run(source.name, source.path, vehicle, wheels, heading, fixes, (*notices, *found))
+    reference = read_reference(source.path, fixes)
+    return Run(source.name, source.path, vehicle, wheels, heading, fixes, (*notices, *found), reference)
 
 
-def _vehicle_toml(source: RunSource) -> Path:
+def vehicle_of(source: RunSource) -> Path:
+    """The vehicle.toml that applies to a run. Raises DataError where there is none."""
     if source.vehicle_toml is None:
         raise DataError(
             f"{source.path}: no vehicle.toml here or above, up to {source.searched_up_to or source.path}; "
@@ -169,7 +171,7 @@ def _root(path: Path) -> Path:
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir():
         return path
-    if path.name in (*RUN_FILES, "vehicle.toml") or _is_message_file(path):
+    if path.name in (*RUN_FILES, "vehicle.toml") or is_message_file(path):
         return path.parent
     raise DataError(
         f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
@@ -177,11 +179,13 @@ def _root(path: Path) -> Path:
     )
 
 
-def _is_message_file(path: Path) -> bool:
+def is_message_file(path: Path) -> bool:
+    """Whether a path is a file that is a run on its own."""
     return path.suffix.lower() in MESSAGE_SUFFIXES and path.is_file()
 
 
-def _is_bag_folder(path: Path) -> bool:
+def is_bag_folder(path: Path) -> bool:
+    """Whether a path is a rosbag2 folder."""
     return (
         path.is_dir()
         and not any((path / name).is_file() for name in RUN_FILES)
