@@ -9,7 +9,7 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -18,6 +18,7 @@ from sccal.errors import Exit, Failure, SccalError, UsageError
 
 if TYPE_CHECKING:
     from sccal.calibration.result import Calibration
+    from sccal.convert.paths import ConvertedRun
     from sccal.degrade.folder import DegradedRun
     from sccal.logs.options import ReadOptions
     from sccal.logs.run import RunSource
@@ -354,6 +355,38 @@ def _tell_degraded(source: RunSource, result: DegradedRun | SccalError) -> None:
     parts = [f"of {result.fixes['before']} fixes {', '.join(did)}"] if did else []
     parts += [f"{count} rows of {name} left out" for name, count in result.rows_dropped.items()]
     print(f"{source.name}: {'; '.join(parts) or 'written'} -> {result.folder}", flush=True)
+    for notice in result.notices:
+        print(f"  {notice}", flush=True)
+
+
+@app.command()
+@_with_read_options
+def convert(
+    paths: Paths,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for the converted runs, outside of the logs.", show_default=False)
+    ],
+    to: Annotated[
+        str, typer.Option(help="mcap or folder; without it, MCAP becomes folders and all else MCAP.")
+    ] = "",
+    *,
+    read: ReadOptions,
+) -> None:
+    """Runs below PATHS from folders or ROS bags into MCAP, or from any log into folders; nothing that is read is lost."""
+    from sccal.convert.paths import convert_paths
+
+    forms: dict[str, Literal["mcap", "folder"] | None] = {"": None, "mcap": "mcap", "folder": "folder"}
+    if to not in forms:
+        raise UsageError(f"--to {to}: must be mcap or folder")
+    converted, failures = convert_paths(paths, out, forms[to], read, _tell_converted)
+    _tell_failures(failures, len(failures) + len(converted))
+
+
+def _tell_converted(source: RunSource, result: ConvertedRun | SccalError) -> None:
+    if isinstance(result, SccalError):
+        print(f"{source.name}: not written", flush=True)
+        return
+    print(f"{source.name}: {source.path} -> {result.path}", flush=True)
     for notice in result.notices:
         print(f"  {notice}", flush=True)
 

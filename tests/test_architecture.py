@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
     {"errors", "arrays", "compiled"},
     {"geodesy", "randomness", "logs"},
-    {"align", "simulate", "degrade"},
+    {"align", "convert", "simulate", "degrade"},
     {"effects"},
     {"filter"},
     {"calibration"},
@@ -30,6 +30,7 @@ FLOORS = (
 FREE = {"__init__", "__main__"}
 MAY_IMPORT = {
     "simulate": {"errors", "arrays", "randomness", "geodesy", "logs"},
+    "convert": {"errors", "arrays", "logs"},
     "degrade": {"errors", "arrays", "randomness", "geodesy", "logs"},
 }
 """Rooms that may use less than all the floors below: what makes or spoils logs shares nothing with what learns."""

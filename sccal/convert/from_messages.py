@@ -13,6 +13,7 @@ from sccal.logs.ahrs import AHRS_COLUMNS
 from sccal.logs.encoder import TRAVEL_UNKNOWN
 from sccal.logs.mcap_heading import in_convention
 from sccal.logs.mcap_run import read_tables
+from sccal.logs.mcap_tables import TableNote
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, WheelStream
@@ -29,8 +30,9 @@ def tables_of_messages(source: RunSource, options: ReadOptions) -> RunTables:
     """
     run = read_run(source, options)
     whole = read_tables(source.path, run.vehicle, options)
-    notices = [notice for notice in run.notices if notice.doubt or notice in whole.notices]
-    encoder = _wheels(run.wheels) if whole.encoder is None else _table(whole.encoder, run.wheels)
+    tables = whole.note.tables
+    notices = [notice for notice in run.notices if notice.doubt or notice in whole.note.notices]
+    encoder = _wheels(run.wheels) if whole.encoder is None else _table(_plain(whole.encoder, tables.get("encoder")), run.wheels)
     nmea = _lines(whole.nmea, encoder, run, notices) if whole.nmea else None
     return RunTables(
         name=source.name,
@@ -38,27 +40,31 @@ def tables_of_messages(source: RunSource, options: ReadOptions) -> RunTables:
         vehicle=run.vehicle,
         vehicle_text=vehicle_of(source).read_bytes(),
         encoder=encoder,
-        ahrs=None if nmea and run.heading.utc_s is not None else _heading(run, whole.ahrs),
-        gnss=None if nmea else _fixes(run.fixes) if whole.gnss is None else _plain(whole.gnss),
+        ahrs=None if nmea and run.heading.utc_s is not None else _heading(run, whole.ahrs and _plain(whole.ahrs, tables.get("ahrs"))),
+        gnss=None if nmea else _fixes(run.fixes) if whole.gnss is None else _plain(whole.gnss, tables.get("gnss")),
         nmea=nmea,
         notices=tuple(notices),
     )
 
 
-def _plain(table: Table) -> LogTable:
-    return LogTable(table.columns["t"], {name: column for name, column in table.columns.items() if name != "t"})
+def _plain(table: Table, note: TableNote | None) -> LogTable:
+    written = {} if note is None else {"t": note.time_places, **note.columns}
+    return LogTable(
+        table.columns["t"],
+        {name: column for name, column in table.columns.items() if name != "t"},
+        {name: places for name, places in written.items() if places is not None},
+    )
 
 
-def _table(table: Table, wheels: WheelStream) -> LogTable:
+def _table(own: LogTable, wheels: WheelStream) -> LogTable:
     """A converted log's own table, with the columns that other topics have added since."""
-    own = _plain(table)
     at = np.searchsorted(own.t_s, wheels.t_s)
     added = {}
     for name, column in wheels.extras.items():
         if name not in own.columns:
             added[_free(name)] = whole = np.full(own.t_s.size, np.nan)
             whole[at] = column
-    return LogTable(own.t_s, {**own.columns, **added})
+    return LogTable(own.t_s, {**own.columns, **added}, own.written)
 
 
 def _wheels(wheels: WheelStream) -> LogTable:
@@ -74,9 +80,9 @@ def _free(name: str) -> str:
     return f"{name}_" if name in (*_ENCODER_COLUMNS, *AHRS_COLUMNS) else name
 
 
-def _heading(run: Run, table: Table | None) -> LogTable:
+def _heading(run: Run, table: LogTable | None) -> LogTable:
     if table is not None:
-        return _plain(table)
+        return table
     heading: HeadingStream = run.heading
     written = heading.convention or run.vehicle.convention
     columns: dict[str, Floats] = {"yaw_rad": in_convention(heading.yaw_rad, written, run.vehicle.convention)}

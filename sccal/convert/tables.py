@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,8 @@ from sccal.logs.mcap_write import nanoseconds_of
 from sccal.logs.streams import Notice, Vehicle
 
 MOST_PLACES = 9
+NOTE_FILE = "convert.json"
+"""In a folder that was converted: that it was, from what, which files, and what was told."""
 _LATEST_S = 2**31 - 2
 
 
@@ -24,16 +26,21 @@ class LogTable:
     t_s: Floats
     columns: Mapping[str, Floats]
     """All but t, in their order; NaN where a cell is empty."""
+    written: Mapping[str, int] = field(default_factory=dict)
+    """Decimals with which a file wrote its columns and t, where all its rows have as many."""
 
     @property
     def time_places(self) -> int | None:
         """Decimals of the times; None where they have as many as a float needs."""
-        return time_places(self.t_s)
+        return self._at_least(time_places(self.t_s), "t")
 
     @property
     def places(self) -> dict[str, int | None]:
         """Decimals of every column; None where they have as many as a float needs."""
-        return {name: value_places(column) for name, column in self.columns.items()}
+        return {name: self._at_least(value_places(column), name) for name, column in self.columns.items()}
+
+    def _at_least(self, places: int | None, name: str) -> int | None:
+        return None if places is None else max(places, self.written.get(name, 0))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from sccal.degrade.faults import Faults
 from sccal.degrade.folder import DegradedRun, degrade_folder
-from sccal.errors import Failure, SccalError, UsageError, as_known
+from sccal.errors import Failure, SccalError, as_known
+from sccal.logs.outputs import require_apart
 from sccal.logs.run import RunSource, find_runs
 
 
@@ -30,7 +31,7 @@ def degrade_paths(
         UsageError: a path that does not exist, or a place for the results that overlaps with the logs.
     """
     sources, failures = find_runs(paths)
-    _check_out(out, sources)
+    require_apart(out, sources, paths)
     degraded: list[DegradedRun] = []
     runs = {source.path for source in sources}
     for source in sources:
@@ -70,17 +71,3 @@ def _write(path: Path, text: bytes) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     temporary.write_bytes(text)
     temporary.replace(path)
-
-
-def _check_out(out: Path, sources: Sequence[RunSource]) -> None:
-    """Logs are never written among the logs that they come from."""
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"--out {out}: a file of that name is in the way")
-    real = [folder.resolve() for source in sources for folder in (source.path, source.searched_up_to or source.path)]
-    places = [(out, out.resolve()), *((out / source.name, (out / source.name).resolve()) for source in sources)]
-    for place, there in places:
-        for folder in real:
-            if there == folder or there in folder.parents or folder in there.parents:
-                raise UsageError(
-                    f"--out {out}: {place} overlaps with the logs in {folder}; name a folder outside of them"
-                )

@@ -28,6 +28,7 @@ Bytes = NDArray[np.uint8]
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _METADATA, _DATA_END = 2, 3, 4, 5, 6, 8, 12, 15
 _HEAD_BYTES = 9
+_LONGEST_HEADER = 1 << 16
 _MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
 _BATCH_BYTES = 1 << 20
 _BATCH_RECORDS = 200_000
@@ -73,6 +74,17 @@ def read_mcap(
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
     return _Walk(path, data, open_channel, {} if metadata is None else metadata).run()
+
+
+def library_of(path: Path) -> str:
+    """What wrote the file, as its header says; empty where it says nothing."""
+    with path.open("rb") as file:
+        begin = memoryview(file.read(_LONGEST_HEADER))
+    try:
+        _, at = _text(begin, len(MAGIC) + _HEAD_BYTES)
+        return _text(begin, at)[0]
+    except (struct.error, ValueError):
+        return ""
 
 
 @dataclass

@@ -132,8 +132,8 @@ class LoggedTables:
     gnss: Table | None
     nmea: bytes | None
     """The lines of the topic that the fixes are read from."""
-    notices: tuple[Notice, ...]
-    """Told when the log was converted."""
+    note: ConversionNote
+    """What was noted when the log was converted; empty for others."""
 
 
 def read_tables(path: Path, vehicle: Vehicle, options: ReadOptions) -> LoggedTables:
@@ -151,7 +151,7 @@ def read_tables(path: Path, vehicle: Vehicle, options: ReadOptions) -> LoggedTab
         ahrs=_ahrs_table(log),
         gnss=None if sentences else _gnss_table(log),
         nmea=lines_of_sentences(messages, _places(log, topic)) if sentences else None,
-        notices=log.note.notices if log.note else (),
+        note=log.note or ConversionNote(),
     )
 
 
