@@ -149,6 +149,9 @@ def calibrate(
         list[str] | None,
         typer.Option(help="Withhold the fixes from 60 to 120 s, say, and tell how far the robot drifts (repeatable)."),
     ] = None,
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="Write calibration.mcap too: the results as messages beside the log's.")
+    ] = False,
     *,
     read: ReadOptions,
 ) -> None:
@@ -181,7 +184,7 @@ def calibrate(
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
         withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
-    batch = calibrate_paths(paths, out, options, _tell, read)
+    batch = calibrate_paths(paths, out, options, _tell, read, mcap)
     width = _width()
     for vehicle, file in batch.vehicles:
         print()

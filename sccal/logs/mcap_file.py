@@ -28,6 +28,8 @@ Bytes = NDArray[np.uint8]
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _METADATA, _DATA_END = 2, 3, 4, 5, 6, 8, 12, 15
 _HEAD_BYTES = 9
+RESULT_LIBRARY = "sccal calibrate"
+"""Named in the header of files that hold results, and so are no runs."""
 _LONGEST_HEADER = 1 << 16
 _MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
 _BATCH_BYTES = 1 << 20
@@ -77,13 +79,13 @@ def read_mcap(
 
 
 def library_of(path: Path) -> str:
-    """What wrote the file, as its header says; empty where it says nothing."""
-    with path.open("rb") as file:
-        begin = memoryview(file.read(_LONGEST_HEADER))
+    """What wrote the file, as its header says; empty where it says nothing or cannot be read."""
     try:
+        with path.open("rb") as file:
+            begin = memoryview(file.read(_LONGEST_HEADER))
         _, at = _text(begin, len(MAGIC) + _HEAD_BYTES)
         return _text(begin, at)[0]
-    except (struct.error, ValueError):
+    except (OSError, struct.error, ValueError):
         return ""
 
 

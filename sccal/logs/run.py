@@ -13,6 +13,7 @@ from sccal.logs.ahrs import read_ahrs
 from sccal.logs.bags import bag_folder_files
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
+from sccal.logs.mcap_file import RESULT_LIBRARY, library_of
 from sccal.logs.mcap_run import MESSAGE_SUFFIXES, read_message_log
 from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.options import ReadOptions
@@ -215,7 +216,9 @@ def _run_places(root: Path) -> Iterator[Path]:
         for name in files:
             suffix = Path(name).suffix.lower()
             if suffix in MESSAGE_SUFFIXES and not name.startswith(".") and not (bag and suffix == ".db3"):
-                yield Path(folder) / name
+                path = Path(folder) / name
+                if suffix != ".mcap" or not path.is_file() or library_of(path) != RESULT_LIBRARY:
+                    yield path
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
