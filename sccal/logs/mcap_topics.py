@@ -6,6 +6,7 @@ with or without underscores.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -176,7 +177,7 @@ class Topics:
         picker = _picker(kind, asked)
         try:
             gatherer = (
-                JsonGatherer(picker) if channel.message_encoding == "json" else Gatherer(_walker(channel), picker)
+                JsonGatherer(picker) if channel.message_encoding == "json" else Gatherer(walker_of(channel), picker)
             )
         except MalformedError as error:
             if kind or asked:
@@ -216,7 +217,9 @@ def _may_be_cause(type_name: str) -> bool:
     return _NO_CAUSE.fullmatch(package) is None
 
 
-def _walker(channel: Channel) -> Walker:
+@functools.cache
+def walker_of(channel: Channel) -> Walker:
+    """What walks the messages of a channel, by its own definitions. Raises MalformedError where they cannot be read."""
     encoding = channel.message_encoding
     if encoding == "protobuf":
         messages = parse_descriptors(channel.schema)
