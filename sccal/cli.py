@@ -264,19 +264,21 @@ def simulate(
         typer.Option(help="Put an effect into the log, e.g. lever_arm=0.3,-0.1 (repeatable; see `sccal effects`)."),
     ] = None,
     show: Annotated[bool, typer.Option("--list", help="List the settings and their defaults.")] = False,
-    samples: Annotated[bool, typer.Option("--samples", help="Make the three sample runs in OUT instead.")] = False,
+    samples: Annotated[bool, typer.Option("--samples", help="Make the sample runs in OUT instead.")] = False,
 ) -> None:
     """A tracked robot's logs with known truth: encoder.csv, ahrs.csv, gnss.nmea, vehicle.toml and truth.json."""
     from sccal.effects.catalogue import parse_effect
     from sccal.simulate.choose import describe_settings, settings_from
-    from sccal.simulate.files import write_run, write_samples, write_vehicle_file
+    from sccal.simulate.files import write_run, write_vehicle_file
     from sccal.simulate.run import simulate_run
 
     if show:
         print("\n".join(describe_settings()))
         return
     if samples:
-        write_samples(out)
+        from sccal.samples import write_all_samples
+
+        write_all_samples(out)
         print(f"sample runs in {out}/")
         return
     if out.exists() and not out.is_dir():
@@ -367,15 +369,14 @@ def _tell_degraded(source: RunSource, result: DegradedRun | SccalError) -> None:
 def convert(
     paths: Paths,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for the converted runs, outside of the logs.", show_default=False)
+        Path,
+        typer.Option("--out", "-o", help="Folder for what is written, outside of the logs.", show_default=False),
     ],
-    to: Annotated[
-        str, typer.Option(help="mcap or folder; without it, MCAP becomes folders and all else MCAP.")
-    ] = "",
+    to: Annotated[str, typer.Option(help="mcap or folder; without it, MCAP becomes folders and all else MCAP.")] = "",
     *,
     read: ReadOptions,
 ) -> None:
-    """Runs below PATHS from folders or ROS bags into MCAP, or from any log into folders; nothing that is read is lost."""
+    """Runs below PATHS from folders or ROS bags into MCAP, or into folders; nothing that is read is lost."""
     from sccal.convert.paths import convert_paths
 
     forms: dict[str, Literal["mcap", "folder"] | None] = {"": None, "mcap": "mcap", "folder": "folder"}

@@ -23,7 +23,7 @@ FLOORS = (
     {"calibration"},
     {"diagnose", "experiments"},
     {"report"},
-    {"batch"},
+    {"batch", "samples"},
     {"cli"},
 )
 """Ground floor first; a room imports from lower floors only."""

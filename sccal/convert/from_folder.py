@@ -122,7 +122,7 @@ def nmea_lines(raw: bytes, run_t_s: Floats, path: Path, notices: list[Notice]) -
 
 
 def _readable(part: bytes) -> bytes:
-    """What follows a ``$``, with it, up to its checksum where other bytes come after; nothing where they come before."""
+    """What follows a ``$``, with it, up to its checksum where other bytes come after it; nothing of other bytes."""
     if part and not _is_text(part):
         found = _CHECKED.match(part)
         part = found[0] if found else b""

@@ -32,7 +32,11 @@ def tables_of_messages(source: RunSource, options: ReadOptions) -> RunTables:
     whole = read_tables(source.path, run.vehicle, options)
     tables = whole.note.tables
     notices = [notice for notice in run.notices if notice.doubt or notice in whole.note.notices]
-    encoder = _wheels(run.wheels) if whole.encoder is None else _table(_plain(whole.encoder, tables.get("encoder")), run.wheels)
+    encoder = (
+        _wheels(run.wheels)
+        if whole.encoder is None
+        else _table(_plain(whole.encoder, tables.get("encoder")), run.wheels)
+    )
     nmea = _lines(whole.nmea, encoder, run, notices) if whole.nmea else None
     return RunTables(
         name=source.name,
@@ -40,7 +44,9 @@ def tables_of_messages(source: RunSource, options: ReadOptions) -> RunTables:
         vehicle=run.vehicle,
         vehicle_text=vehicle_of(source).read_bytes(),
         encoder=encoder,
-        ahrs=None if nmea and run.heading.utc_s is not None else _heading(run, whole.ahrs and _plain(whole.ahrs, tables.get("ahrs"))),
+        ahrs=None
+        if nmea and run.heading.utc_s is not None
+        else _heading(run, whole.ahrs and _plain(whole.ahrs, tables.get("ahrs"))),
         gnss=None if nmea else _fixes(run.fixes) if whole.gnss is None else _plain(whole.gnss, tables.get("gnss")),
         nmea=nmea,
         notices=tuple(notices),

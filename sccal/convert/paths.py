@@ -77,9 +77,7 @@ def _other_form(source: RunSource) -> Form:
     return "folder" if source.path.suffix.lower() == ".mcap" and source.path.is_file() else "mcap"
 
 
-def _convert(
-    source: RunSource, out: Path, form: Form, options: ReadOptions, inputs: Collection[Path]
-) -> ConvertedRun:
+def _convert(source: RunSource, out: Path, form: Form, options: ReadOptions, inputs: Collection[Path]) -> ConvertedRun:
     target = _target(source, out, form)
     if target.resolve() in inputs:
         raise UsageError(f"--out {out}: {target} is one of the logs to convert; name another folder")

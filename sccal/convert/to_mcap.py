@@ -1,8 +1,8 @@
 """Tables as an MCAP file in the ros2 profile, with what standard messages cannot hold beside them.
 
 ``/joint_states`` (JointState: wheel angles, counts turned into radians), ``/imu/data`` (Imu), ``/nmea_sentence``
-(nmea_msgs/Sentence, every line) or ``/fix`` (NavSatFix), and ``/encoder/…``, ``/ahrs/…``, ``/gnss/…`` (Float64): further
-columns, and those that cannot be had back from the standard message bit by bit. See ``sccal.logs.mcap_tables``.
+(nmea_msgs/Sentence, every line) or ``/fix`` (NavSatFix), and ``/encoder/…``, ``/ahrs/…``, ``/gnss/…`` (Float64):
+further columns, and those that cannot be had back from the standard message bit by bit. See ``sccal.logs.mcap_tables``.
 """
 
 from __future__ import annotations
@@ -194,9 +194,7 @@ def _beside(
         side[name] = topic = _topic(kind, name, side)
         rows = np.isfinite(column)
         topics.append(encoded(topic, "std_msgs/msg/Float64", table.t_s[rows], {}, {}, {"data": column[rows]}))
-    notes[kind] = TableNote(
-        note.topic, note.columns, side, note.time_places, note.ticks_per_rev, note.whole_turn
-    )
+    notes[kind] = TableNote(note.topic, note.columns, side, note.time_places, note.ticks_per_rev, note.whole_turn)
     return topics
 
 

@@ -164,9 +164,7 @@ def degrade_folder(source: RunSource, target: Path, faults: Faults, others: Coll
     return DegradedRun(source.name, target, run.fixes, run.rows_dropped, run.notices)
 
 
-def _written(
-    source: RunSource, staging: Path, task: Task, others: Collection[Path], notices: list[str]
-) -> DegradedRun:
+def _written(source: RunSource, staging: Path, task: Task, others: Collection[Path], notices: list[str]) -> DegradedRun:
     files: list[dict[str, object]] = []
     rows: ReferenceRows | None = None
     fixes: dict[str, int] = {}

@@ -93,7 +93,7 @@ def changes_of(log: LogOfMessages, faults: Faults) -> Changes:
         sentences = [m for m in log.of_kinds("Sentence") if has_positions(m)]
         positions = log.of_kinds(*_POSITIONS)
         if not sentences and not positions:
-            raise DataError("no topic with fixes (Sentence, NavSatFix, GPSFix, LocationFix), which the faults would change")
+            raise DataError("no topic with fixes (Sentence, NavSatFix, GPSFix, LocationFix), which faults would change")
         for one in sentences:
             _sentences(one, log, faults, changes)
         for one in positions:

@@ -8,6 +8,7 @@ left out as zero is appended: a later field takes the place of an earlier one, a
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -97,8 +98,10 @@ def _json_patched(data: bytes, numbers: Mapping[str, float], text: bytes | None)
 
 
 def _put(message: Any, way: tuple[str | int, ...], value: float | str) -> None:
+    """JSON has no NaN: null says as much."""
     for step in way[:-1]:
         message = message[step]
     old = message[way[-1]]
     whole = isinstance(old, int) and not isinstance(value, str) and value == round(value)
-    message[way[-1]] = round(float(value)) if whole else value
+    none = not isinstance(value, str) and math.isnan(value)
+    message[way[-1]] = None if none else round(float(value)) if whole else value

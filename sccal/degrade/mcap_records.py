@@ -23,7 +23,7 @@ _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 
 Change = Callable[[int, int, bytes], bytes | None]
-"""Channel, place of the message among its channel's (from 0) and its bytes; gives the new bytes, or None to leave out."""
+"""Channel, place of a message among its channel's (from 0) and its bytes; gives the new bytes, None to leave out."""
 
 
 @dataclass
@@ -133,13 +133,14 @@ class _Rewriter:
         self.out += _record(_DATA_END, struct.pack("<I", zlib.crc32(self.out) if crc else 0))
         footer = len(self.raw) - len(MAGIC) - _HEAD.size - 20
         summary, offsets, summary_crc = struct.unpack_from("<QQI", self.raw, footer + _HEAD.size)
-        start, groups = len(self.out), {}
+        start = len(self.out)
+        groups: dict[int, tuple[int, int]] = {}
         for opcode, begin, end in _records(self.raw[:footer], after):
             if opcode == _SUMMARY_OFFSET:
                 continue
             here = len(self.out)
             self.out += _record(opcode, self._summarised(opcode, self.raw[begin:end]))
-            groups[opcode] = (groups.get(opcode, (here,))[0], len(self.out))
+            groups[opcode] = (groups.get(opcode, (here, here))[0], len(self.out))
         offsets_start = len(self.out)
         if offsets:
             for opcode, (begin, end) in groups.items():
@@ -156,12 +157,12 @@ class _Rewriter:
                 return self.chunk_indexes[old]
             shift = self.moved[old] - old
             (size,) = struct.unpack_from("<I", record, 32)
-            table = bytearray(record)
-            struct.pack_into("<Q", table, 16, old + shift)
+            moved = bytearray(record)
+            struct.pack_into("<Q", moved, 16, old + shift)
             for at in range(36, 36 + size, 10):
                 channel, place = struct.unpack_from("<HQ", record, at)
-                struct.pack_into("<HQ", table, at, channel, place + shift)
-            return bytes(table)
+                struct.pack_into("<HQ", moved, at, channel, place + shift)
+            return bytes(moved)
         if opcode in (_ATTACHMENT_INDEX, _METADATA_INDEX):
             (old,) = struct.unpack_from("<Q", record, 0)
             return struct.pack("<Q", self.moved.get(old, old)) + record[8:]

@@ -10,8 +10,8 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
-from sccal.logs.bags import BAG_SUFFIXES, read_bag
 from sccal.logs.ahrs import heading_of_table
+from sccal.logs.bags import BAG_SUFFIXES, read_bag
 from sccal.logs.encoder import repaired_wheels
 from sccal.logs.gnss_csv import fixes_of_table
 from sccal.logs.mcap_file import read_mcap
@@ -27,9 +27,9 @@ from sccal.logs.mcap_heading import has_orientation, heading_of_field, heading_o
 from sccal.logs.mcap_tables import ConversionNote, TableKind, note_of, table_of
 from sccal.logs.mcap_topics import FIELDS, Messages, Topics
 from sccal.logs.mcap_wheels import (
-    of_messages,
     joint_names,
     joints_of,
+    of_messages,
     wheels_of_joints,
     wheels_of_odometry,
     wheels_of_paths,
@@ -110,10 +110,8 @@ def read_message_log(
 def _opened(path: Path, vehicle: Vehicle, options: ReadOptions) -> tuple[_Log, tuple[Notice, ...]]:
     topics = Topics(_asked_paths(options))
     metadata: dict[str, dict[str, str]] = {}
-    if path.suffix.lower() == ".mcap":
-        notices = read_mcap(path, topics.open, metadata)
-    else:
-        notices = read_bag(path, topics.open)
+    in_mcap = path.suffix.lower() == ".mcap"
+    notices = read_mcap(path, topics.open, metadata) if in_mcap else read_bag(path, topics.open)
     if not topics.seen:
         why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
         raise DataError(f"{path}: no message can be read: {why}")

@@ -150,8 +150,7 @@ def recovered(
     ``number`` gives the messages' fields (n) by the reader's names for them.
     """
     return {
-        name: _snapped(values, note.columns[name])
-        for name, values in _RECOVER[kind](note, number, convention).items()
+        name: _snapped(values, note.columns[name]) for name, values in _RECOVER[kind](note, number, convention).items()
     }
 
 
@@ -163,12 +162,11 @@ def _snapped(values: Floats, places: int | None) -> Floats:
         return np.where(np.abs(near - values) <= _NEAR * np.maximum(1.0, np.abs(values)), near, values)
 
 
-def _encoder(note: TableNote, number: Callable[[str], Floats], _: Convention) -> dict[str, Floats]:
+def _encoder(note: TableNote, number: Callable[[str], Floats], _convention: Convention) -> dict[str, Floats]:
     columns = {}
     for name in note.columns:
-        side, _, unit = name.partition("_")
         if name in ("left_rad", "right_rad", "left_ticks", "right_ticks"):
-            angle = number(f"position {LEFT_JOINT if side == 'left' else RIGHT_JOINT}")
+            angle = number(f"position {LEFT_JOINT if name.startswith('left') else RIGHT_JOINT}")
             columns[name] = angle * (note.ticks_per_rev / (2 * np.pi)) if note.ticks_per_rev else angle
         else:
             columns[name] = np.full(number(f"position {LEFT_JOINT}").size, np.nan)
@@ -196,7 +194,7 @@ def _ahrs(note: TableNote, number: Callable[[str], Floats], convention: Conventi
     return columns
 
 
-def _gnss(note: TableNote, number: Callable[[str], Floats], _: Convention) -> dict[str, Floats]:
+def _gnss(note: TableNote, number: Callable[[str], Floats], _convention: Convention) -> dict[str, Floats]:
     east, north = number("cov_ee"), number("cov_nn")
     stated = (east > 0) & (north > 0) & (number("cov_type") != 0)
     sigma_east, sigma_north = (np.sqrt(np.where(stated, variance, np.nan)) for variance in (east, north))

@@ -202,19 +202,19 @@ def _further(run: Run) -> Iterator[Stamped]:
 def encoded(
     topic: str,
     type_name: str,
-    times: Floats | Ints,
+    times: Floats,
     texts: Mapping[str, str],
     counts: Mapping[str, int],
     numbers: Mapping[str, Floats],
 ) -> Stamped:
     """Messages of one layout: ``texts`` by path, lengths of sequences by path, and columns (n) of numbers by path.
 
-    ``times`` (n) are seconds, or whole nanoseconds as integers.
+    ``times`` (n) are seconds.
     """
     root = type_name.replace("/msg/", "/")
     blank = _Blank(texts, counts).encoded(root)
     places = RosWalker(known_definitions(), root).shape(blank).numbers
-    stamp_ns = times if times.dtype.kind == "i" else nanoseconds_of(times)
+    stamp_ns = nanoseconds_of(times)
     rows: NDArray[np.uint8] = np.tile(np.frombuffer(blank, dtype=np.uint8), (times.size, 1))
     columns: dict[str, Floats | Ints] = dict(numbers)
     if "header.stamp.sec" in places:

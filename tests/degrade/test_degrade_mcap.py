@@ -81,6 +81,7 @@ def test_every_encoding_is_displaced_as_the_folder_is(run: Run, tmp_path: Path, 
         np.testing.assert_array_equal(after.fixes.lat_deg, folder.fixes.lat_deg)
         np.testing.assert_array_equal(after.fixes.quality, folder.fixes.quality)
     assert set(after.fixes.quality.tolist()) == {1}
+    assert b"NaN" not in (tmp_path / "out" / "run.mcap").read_bytes() or encoding != "json"
 
 
 def everything(path: Path) -> tuple[dict[str, list[tuple[int, int, int, bytes]]], Any]:

@@ -25,7 +25,12 @@ Messages = dict[str, list[tuple[int, Any]]]
 @pytest.fixture(scope="module", params=[0.0, 1717243230.0])
 def result(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Calibration, Path]:
     root = tmp_path_factory.mktemp("calibrated")
-    written(root / "logs" / "run", "clock.start_utc_s=1717243200", f"clock.host_epoch_offset_s={request.param}", duration_s=90.0)
+    written(
+        root / "logs" / "run",
+        "clock.start_utc_s=1717243200",
+        f"clock.host_epoch_offset_s={request.param}",
+        duration_s=90.0,
+    )
     batch = calibrate_paths([root / "logs"], root / "out", CalibrationOptions(), lambda *_: None, with_mcap=True)
     return batch.calibrated[0], root / "out" / "run" / "calibration.mcap"
 
@@ -33,7 +38,9 @@ def result(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 def decoded(path: Path) -> Messages:
     found: Messages = {}
     with path.open("rb") as file:
-        for _, channel, message, value in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+        for _, channel, message, value in make_reader(
+            file, decoder_factories=[DecoderFactory()]
+        ).iter_decoded_messages():
             found.setdefault(channel.topic, []).append((message.log_time, value))
     return found
 
