@@ -8,7 +8,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.convert.from_folder import nmea_lines
-from sccal.convert.tables import LogTable, NmeaLines, RunTables
+from sccal.convert.tables import LogTable, RunTables
 from sccal.logs.ahrs import AHRS_COLUMNS
 from sccal.logs.encoder import TRAVEL_UNKNOWN
 from sccal.logs.mcap_heading import in_convention
@@ -16,7 +16,7 @@ from sccal.logs.mcap_run import read_tables
 from sccal.logs.mcap_tables import TableNote
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run, vehicle_of
-from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, WheelStream
+from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream
 from sccal.logs.table import Table
 
 _ENCODER_COLUMNS = ("t", "left_ticks", "right_ticks", "left_rad", "right_rad", TRAVEL_UNKNOWN)
@@ -30,30 +30,29 @@ def tables_of_messages(source: RunSource, options: ReadOptions) -> RunTables:
     """
     run = read_run(source, options)
     whole = read_tables(source.path, run.vehicle, options)
-    tables = whole.note.tables
     notices = [notice for notice in run.notices if notice.doubt or notice in whole.note.notices]
-    encoder = (
-        _wheels(run.wheels)
-        if whole.encoder is None
-        else _table(_plain(whole.encoder, tables.get("encoder")), run.wheels)
+    encoder, ahrs, gnss = (
+        _plain(table, whole.note.tables.get(kind))
+        for kind, table in (("encoder", whole.encoder), ("ahrs", whole.ahrs), ("gnss", whole.gnss))
     )
-    nmea = _lines(whole.nmea, encoder, run, notices) if whole.nmea else None
+    encoder = _wheels(run.wheels) if encoder is None else _table(encoder, run.wheels)
+    nmea = nmea_lines(whole.nmea, encoder.t_s, run.path, notices) if whole.nmea else None
     return RunTables(
         name=source.name,
         path=source.path,
         vehicle=run.vehicle,
         vehicle_text=vehicle_of(source).read_bytes(),
         encoder=encoder,
-        ahrs=None
-        if nmea and run.heading.utc_s is not None
-        else _heading(run, whole.ahrs and _plain(whole.ahrs, tables.get("ahrs"))),
-        gnss=None if nmea else _fixes(run.fixes) if whole.gnss is None else _plain(whole.gnss, tables.get("gnss")),
+        ahrs=None if nmea and run.heading.utc_s is not None else ahrs or _heading(run),
+        gnss=None if nmea else gnss or _fixes(run.fixes),
         nmea=nmea,
         notices=tuple(notices),
     )
 
 
-def _plain(table: Table, note: TableNote | None) -> LogTable:
+def _plain(table: Table | None, note: TableNote | None) -> LogTable | None:
+    if table is None:
+        return None
     written = {} if note is None else {"t": note.time_places, **note.columns}
     return LogTable(
         table.columns["t"],
@@ -86,20 +85,17 @@ def _free(name: str) -> str:
     return f"{name}_" if name in (*_ENCODER_COLUMNS, *AHRS_COLUMNS) else name
 
 
-def _heading(run: Run, table: LogTable | None) -> LogTable:
-    if table is not None:
-        return table
+def _heading(run: Run) -> LogTable:
     heading: HeadingStream = run.heading
     written = heading.convention or run.vehicle.convention
     columns: dict[str, Floats] = {"yaw_rad": in_convention(heading.yaw_rad, written, run.vehicle.convention)}
-    for name, values in (
+    further = (
         ("pitch_rad", heading.pitch_rad),
         ("roll_rad", heading.roll_rad),
         ("yaw_sigma_rad", heading.yaw_sigma_rad),
         ("gyro_z_radps", heading.gyro_z_radps),
-    ):
-        if values is not None:
-            columns[name] = values
+    )
+    columns |= {name: values for name, values in further if values is not None}
     return LogTable(heading.t_s, {**columns, **{_free(name): column for name, column in heading.extras.items()}})
 
 
@@ -117,7 +113,3 @@ def _fixes(fixes: FixStream) -> LogTable:
             columns["sigma_east_m"], columns["sigma_north_m"] = fixes.sigma_east_m, fixes.sigma_north_m
             columns["cov_en_m2"] = fixes.cov_en_m2
     return LogTable(fixes.host_t_s, {**columns, **{_free(name): column for name, column in fixes.extras.items()}})
-
-
-def _lines(raw: bytes, encoder: LogTable, run: Run, notices: list[Notice]) -> NmeaLines:
-    return nmea_lines(raw, encoder.t_s, run.path, notices)

@@ -167,7 +167,7 @@ def test_angles_sigmas_qualities_and_columns_come_back(tmp_path: Path, conventio
 
 
 def test_signs_for_others_to_read(tmp_path: Path) -> None:
-    """A compass heading of 30 degrees, nose up and left side up, as ROS has it: 60 from east, pitch minus, roll plus."""
+    """A compass heading of 30 degrees, nose up, left side up, as ROS has it: 60 from east, pitch minus, roll plus."""
     still = np.zeros(ROWS)
     ahrs = rows("t,yaw_deg,pitch_deg,roll_deg", T, still + 30, still + 10, still + 5)
     convert(made(tmp_path / "run", ahrs, GNSS, convention="ned"), tmp_path / "a")
@@ -269,7 +269,7 @@ def test_a_run_without_ahrs_keeps_the_receivers_heading(simulated: Path, tmp_pat
     for line in (simulated / "gnss.nmea").read_text().splitlines():
         lines.append(line)
         if "GGA" in line:
-            t, body = line.split(" ", 1)
+            t = line.split(" ", 1)[0]
             heading = f"GNTHS,{(float(t) * 3) % 360:.2f},A"
             lines.append(f"{float(t) + 0.002:.4f} ${heading}*{checksum(heading)}")
     (folder / "gnss.nmea").write_text("\n".join(lines) + "\n")
@@ -354,7 +354,7 @@ def test_nothing_of_others_is_overwritten(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out" / "run" / "convert.json").read_text())["schema"] == "sccal.convert/1"
     (tmp_path / "out" / "run" / "convert.json").unlink()
     assert command("convert", log, "--out", tmp_path / "out")[0] == 2
-    assert not [path for path in tmp_path.rglob(".*")]
+    assert not list(tmp_path.rglob(".*"))
 
 
 def command(*arguments: object) -> tuple[int, str, str]:

@@ -93,7 +93,8 @@ def everything(path: Path) -> tuple[dict[str, list[tuple[int, int, int, bytes]]]
         for _, channel, one in reader.iter_messages():
             messages.setdefault(channel.topic, []).append((one.log_time, one.publish_time, one.sequence, one.data))
         summary = reader.get_summary()
-        assert summary is not None and summary.statistics is not None
+        assert summary is not None
+        assert summary.statistics is not None
         counts = {summary.channels[k].topic: n for k, n in summary.statistics.channel_message_counts.items()}
         assert counts == {topic: len(rows) for topic, rows in messages.items()}
         rest = (
