@@ -9,7 +9,7 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -18,6 +18,7 @@ from sccal.errors import Exit, Failure, SccalError, UsageError
 
 if TYPE_CHECKING:
     from sccal.calibration.result import Calibration
+    from sccal.convert.paths import ConvertedRun
     from sccal.degrade.folder import DegradedRun
     from sccal.logs.options import ReadOptions
     from sccal.logs.run import RunSource
@@ -148,6 +149,9 @@ def calibrate(
         list[str] | None,
         typer.Option(help="Withhold the fixes from 60 to 120 s, say, and tell how far the robot drifts (repeatable)."),
     ] = None,
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="Write calibration.mcap too: the results as messages beside the log's.")
+    ] = False,
     *,
     read: ReadOptions,
 ) -> None:
@@ -180,7 +184,7 @@ def calibrate(
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
         withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
-    batch = calibrate_paths(paths, out, options, _tell, read)
+    batch = calibrate_paths(paths, out, options, _tell, read, mcap)
     width = _width()
     for vehicle, file in batch.vehicles:
         print()
@@ -293,19 +297,21 @@ def simulate(
         typer.Option(help="Put an effect into the log, e.g. lever_arm=0.3,-0.1 (repeatable; see `sccal effects`)."),
     ] = None,
     show: Annotated[bool, typer.Option("--list", help="List the settings and their defaults.")] = False,
-    samples: Annotated[bool, typer.Option("--samples", help="Make the three sample runs in OUT instead.")] = False,
+    samples: Annotated[bool, typer.Option("--samples", help="Make the sample runs in OUT instead.")] = False,
 ) -> None:
     """A tracked robot's logs with known truth: encoder.csv, ahrs.csv, gnss.nmea, vehicle.toml and truth.json."""
     from sccal.effects.catalogue import parse_effect
     from sccal.simulate.choose import describe_settings, settings_from
-    from sccal.simulate.files import write_run, write_samples, write_vehicle_file
+    from sccal.simulate.files import write_run, write_vehicle_file
     from sccal.simulate.run import simulate_run
 
     if show:
         print("\n".join(describe_settings()))
         return
     if samples:
-        write_samples(out)
+        from sccal.samples import write_all_samples
+
+        write_all_samples(out)
         print(f"sample runs in {out}/")
         return
     if out.exists() and not out.is_dir():
@@ -387,6 +393,37 @@ def _tell_degraded(source: RunSource, result: DegradedRun | SccalError) -> None:
     parts = [f"of {result.fixes['before']} fixes {', '.join(did)}"] if did else []
     parts += [f"{count} rows of {name} left out" for name, count in result.rows_dropped.items()]
     print(f"{source.name}: {'; '.join(parts) or 'written'} -> {result.folder}", flush=True)
+    for notice in result.notices:
+        print(f"  {notice}", flush=True)
+
+
+@app.command()
+@_with_read_options
+def convert(
+    paths: Paths,
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="Folder for what is written, outside of the logs.", show_default=False),
+    ],
+    to: Annotated[str, typer.Option(help="mcap or folder; without it, MCAP becomes folders and all else MCAP.")] = "",
+    *,
+    read: ReadOptions,
+) -> None:
+    """Runs below PATHS from folders or ROS bags into MCAP, or into folders; nothing that is read is lost."""
+    from sccal.convert.paths import convert_paths
+
+    forms: dict[str, Literal["mcap", "folder"] | None] = {"": None, "mcap": "mcap", "folder": "folder"}
+    if to not in forms:
+        raise UsageError(f"--to {to}: must be mcap or folder")
+    converted, failures = convert_paths(paths, out, forms[to], read, _tell_converted)
+    _tell_failures(failures, len(failures) + len(converted))
+
+
+def _tell_converted(source: RunSource, result: ConvertedRun | SccalError) -> None:
+    if isinstance(result, SccalError):
+        print(f"{source.name}: not written", flush=True)
+        return
+    print(f"{source.name}: {source.path} -> {result.path}", flush=True)
     for notice in result.notices:
         print(f"  {notice}", flush=True)
 

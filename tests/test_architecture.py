@@ -17,19 +17,20 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
     {"errors", "arrays", "compiled"},
     {"geodesy", "randomness", "logs"},
-    {"align", "simulate", "degrade"},
+    {"align", "convert", "simulate", "degrade"},
     {"effects"},
     {"filter"},
     {"calibration"},
     {"diagnose", "experiments", "inspect"},
     {"report"},
-    {"batch"},
+    {"batch", "samples"},
     {"cli"},
 )
 """Ground floor first; a room imports from lower floors only."""
 FREE = {"__init__", "__main__"}
 MAY_IMPORT = {
     "simulate": {"errors", "arrays", "randomness", "geodesy", "logs"},
+    "convert": {"errors", "arrays", "logs"},
     "degrade": {"errors", "arrays", "randomness", "geodesy", "logs"},
 }
 """Rooms that may use less than all the floors below: what makes or spoils logs shares nothing with what learns."""

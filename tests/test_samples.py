@@ -38,16 +38,27 @@ def calibrated(tmp_path_factory):
     return out, shown.getvalue()
 
 
-@pytest.mark.parametrize("run", ["circle", "general", "rectangle", ""])
+@pytest.mark.parametrize("run", ["circle", "figure8", "general", "rectangle", ""])
 def test_the_truth_lies_within_three_sigmas(calibrated, run):
     out, _ = calibrated
     file = out / run / "calibration.json" if run else out / "vehicle.json"
     found = json.loads(file.read_text())["parameters"]
-    truth = json.loads((ROOT / "sample_logs" / (run or "general") / "truth.json").read_text())["parameters"]
+    truth_file = "figure8.truth.json" if run == "figure8" else f"{run or 'general'}/truth.json"
+    truth = json.loads((ROOT / "sample_logs" / truth_file).read_text())["parameters"]
     for name in ("radius_right_m", "radius_left_m", "track_m", "heading_offset_deg"):
         assert found[name]["status"] == "estimated"
         assert abs(found[name]["value"] - truth[name]) < 3 * found[name]["sigma"]
     assert abs(found["heading_offset_deg"]["value"] - truth["heading_offset_deg"]) < 0.3
+
+
+def test_the_samples_are_made_to_the_byte(tmp_path):
+    from sccal.samples import write_all_samples
+
+    write_all_samples(tmp_path)
+    there = {path.relative_to(ROOT / "sample_logs"): path for path in (ROOT / "sample_logs").rglob("*.*")}
+    made = {path.relative_to(tmp_path): path for path in tmp_path.rglob("*.*")}
+    assert there.keys() == made.keys()
+    assert [name for name in there if there[name].read_bytes() != made[name].read_bytes()] == []
 
 
 def test_the_samples_are_small():

@@ -234,6 +234,8 @@ class Calibration:
     against_reference: AgainstReference | None = None
     """None where all fixes teach and were never displaced."""
     unseen: tuple[Unseen, ...] = ()
+    origin_alt_m: float = 0.0
+    """Height at which the tangent plane lies."""
 
 
 @dataclass(frozen=True)

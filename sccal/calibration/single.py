@@ -77,6 +77,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             parameters=judge(values[:4], covariance[:4, :4], aligned.vehicle, options.filter, drive),
             origin_lat_deg=aligned.plane.lat_deg,
             origin_lon_deg=aligned.plane.lon_deg,
+            origin_alt_m=aligned.plane.alt_m,
             fit=measure_fit(problem, final),
             outage=outage,
             noise=problem.noise,

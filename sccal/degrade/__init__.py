@@ -4,5 +4,8 @@
 ``nmea``     NMEA logs; ``layouts`` says where each kind of sentence holds what, ``decimals`` reads and writes fields,
              ``edits`` cuts new text into a buffer
 ``tables``   CSV files: gnss.csv, ahrs.csv, encoder.csv
-``folder``   a run's folder, its copy and its manifest; ``paths`` all runs of one call
+``folder``   a run's folder, its copy and its manifest
+``mcap``     an MCAP file: ``mcap_faults`` says which messages change and how, ``mcap_patch`` changes one,
+             ``mcap_records`` writes the file again
+``paths``    all runs of one call
 """

@@ -24,7 +24,7 @@ from sccal.degrade.reference import after_both, reference_text
 from sccal.degrade.sheet import Sheet
 from sccal.degrade.tables import degrade_ahrs_csv, degrade_encoder_csv, degrade_gnss_csv
 from sccal.errors import DataError, UsageError
-from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, ReferenceRows, read_reference_rows
+from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, ReferenceRows, beside, read_reference_rows
 from sccal.logs.run import RunSource
 from sccal.logs.streams import Convention
 from sccal.logs.timeline import order_in_time
@@ -49,7 +49,7 @@ class DegradedRun:
 
 
 @dataclass(frozen=True)
-class _Task:
+class Task:
     """What every file of a run is rewritten with."""
 
     faults: Faults
@@ -69,7 +69,7 @@ class _Changed:
     notices: tuple[str, ...] = ()
 
 
-def _nmea(raw: bytes, task: _Task) -> _Changed:
+def _nmea(raw: bytes, task: Task) -> _Changed:
     done = degrade_nmea(raw, task.faults, task.span_s, task.name)
     epochs, fixes, read = done.epochs, done.fixes, done.epochs.read
     dated = np.isfinite(epochs.utc_s).all()
@@ -88,7 +88,7 @@ def _nmea(raw: bytes, task: _Task) -> _Changed:
     return _Changed(done.raw, {"sentences": sentences}, rows, int(fixes.outlier[read].sum()), notices)
 
 
-def _gnss_csv(raw: bytes, task: _Task) -> _Changed:
+def _gnss_csv(raw: bytes, task: Task) -> _Changed:
     done = degrade_gnss_csv(raw, task.faults, task.span_s, task.name)
     read, fixes = done.read, done.fixes
     order = np.flatnonzero(read)[np.argsort(done.t_s[read], kind="stable")]
@@ -104,21 +104,21 @@ def _gnss_csv(raw: bytes, task: _Task) -> _Changed:
     return _Changed(done.raw, {"rows_dropped": done.rows_dropped}, rows, int(fixes.outlier[read].sum()))
 
 
-def _ahrs_csv(raw: bytes, task: _Task) -> _Changed:
+def _ahrs_csv(raw: bytes, task: Task) -> _Changed:
     if not task.faults.heading_drift_deg_per_hour:
         return _Changed(raw)
     new, rows = degrade_ahrs_csv(raw, task.faults, task.convention)
     return _Changed(new, {"rows_rewritten": rows})
 
 
-def _encoder_csv(raw: bytes, task: _Task) -> _Changed:
+def _encoder_csv(raw: bytes, task: Task) -> _Changed:
     if not task.faults.encoder_dropout:
         return _Changed(raw)
     new, rows = degrade_encoder_csv(raw, task.faults, task.name)
     return _Changed(new, {"rows_dropped": rows})
 
 
-Rewriter = Callable[[bytes, _Task], _Changed]
+Rewriter = Callable[[bytes, Task], _Changed]
 
 REWRITERS: Mapping[str, Rewriter] = {
     "gnss.nmea": _nmea,
@@ -149,7 +149,7 @@ def degrade_folder(source: RunSource, target: Path, faults: Faults, others: Coll
     notices: list[str] = []
     if faults.none:
         notices.append("no fault given: the files are as they were")
-    task = _Task(faults, source.name, _span_s(source.path, faults, notices), _convention(source, faults))
+    task = Task(faults, source.name, _span_s(source.path, faults, notices), convention_of(source, faults))
     target.parent.mkdir(parents=True, exist_ok=True)
     staging = target.parent / f".{target.name}.{os.getpid()}.part"
     shutil.rmtree(staging, ignore_errors=True)
@@ -164,9 +164,7 @@ def degrade_folder(source: RunSource, target: Path, faults: Faults, others: Coll
     return DegradedRun(source.name, target, run.fixes, run.rows_dropped, run.notices)
 
 
-def _written(
-    source: RunSource, staging: Path, task: _Task, others: Collection[Path], notices: list[str]
-) -> DegradedRun:
+def _written(source: RunSource, staging: Path, task: Task, others: Collection[Path], notices: list[str]) -> DegradedRun:
     files: list[dict[str, object]] = []
     rows: ReferenceRows | None = None
     fixes: dict[str, int] = {}
@@ -195,17 +193,17 @@ def _written(
             dropped[relative.name] = count
         if changed.rows is not None and (rows is None or relative.name == _FIX_FILES[0]):
             rows = changed.rows
-            fixes = _fix_counts(rows, changed.outliers)
+            fixes = fix_counts(rows, changed.outliers)
     if rows is not None:
-        rows = _with_earlier(rows, source.path, notices)
+        rows = with_earlier(rows, source.path, notices)
         (staging / REFERENCE_FILE).write_bytes(reference_text(rows))
     run = DegradedRun(source.name, staging, fixes, dropped, tuple(notices))
-    manifest = _manifest(source, task, run, files, rows is not None)
+    manifest = manifest_of(source, task, run, files, rows is not None)
     (staging / MANIFEST_FILE).write_text(json.dumps(manifest, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     return run
 
 
-def _changed(raw: bytes, path: Path, rewriter: Rewriter, task: _Task, notices: list[str]) -> _Changed:
+def _changed(raw: bytes, path: Path, rewriter: Rewriter, task: Task, notices: list[str]) -> _Changed:
     """What a rewriter makes of a file; a file that no fault concerns may be unreadable."""
     concerned = task.faults.touch_fixes if path.name in _FIX_FILES else not task.faults.none
     try:
@@ -217,15 +215,16 @@ def _changed(raw: bytes, path: Path, rewriter: Rewriter, task: _Task, notices: l
         return _Changed(raw)
 
 
-def _fix_counts(rows: ReferenceRows, outliers: int) -> dict[str, int]:
+def fix_counts(rows: ReferenceRows, outliers: int) -> dict[str, int]:
+    """What became of the fixes, as the manifest counts them."""
     same, displaced, lost = np.bincount(rows.state, minlength=3).tolist()
     return {"before": rows.lost.size, "same": same, "displaced": displaced, "lost": lost, "outliers": outliers}
 
 
-def _with_earlier(rows: ReferenceRows, folder: Path, notices: list[str]) -> ReferenceRows:
+def with_earlier(rows: ReferenceRows, folder: Path, notices: list[str]) -> ReferenceRows:
     """The reference of a log that was degraded before stays what it was."""
-    path = folder / REFERENCE_FILE
-    if not path.is_file() or not (folder / MANIFEST_FILE).is_file() or rows.lost.size == 0:
+    path = beside(folder, REFERENCE_FILE)
+    if not path.is_file() or not beside(folder, MANIFEST_FILE).is_file() or rows.lost.size == 0:
         return rows
     try:
         both = after_both(read_reference_rows(path), rows)
@@ -236,9 +235,10 @@ def _with_earlier(rows: ReferenceRows, folder: Path, notices: list[str]) -> Refe
     return both
 
 
-def _manifest(
-    source: RunSource, task: _Task, run: DegradedRun, files: list[dict[str, object]], with_reference: bool
+def manifest_of(
+    source: RunSource, task: Task, run: DegradedRun, files: list[dict[str, object]], with_reference: bool
 ) -> dict[str, object]:
+    """The document of degrade.json."""
     windows: dict[str, object] = {}
     if task.span_s is not None:
         resolved = resolve(task.faults, task.span_s)
@@ -260,7 +260,7 @@ def _manifest(
         "files": files,
         "notices": list(run.notices),
     }
-    before = source.path / MANIFEST_FILE
+    before = beside(source.path, MANIFEST_FILE)
     if before.is_file():
         try:
             manifest["degraded_before"] = json.loads(before.read_text(encoding="utf-8"))
@@ -298,7 +298,8 @@ def _span_s(folder: Path, faults: Faults, notices: list[str]) -> tuple[float, fl
     return None
 
 
-def _convention(source: RunSource, faults: Faults) -> Convention:
+def convention_of(source: RunSource, faults: Faults) -> Convention:
+    """Which way the run's yaw turns, where a fault needs it. Raises DataError where nobody says."""
     if not faults.heading_drift_deg_per_hour:
         return "enu"
     if source.vehicle_toml is None:

@@ -12,8 +12,10 @@ from pathlib import Path
 
 from sccal.degrade.faults import Faults
 from sccal.degrade.folder import DegradedRun, degrade_folder
-from sccal.errors import Failure, SccalError, UsageError, as_known
-from sccal.logs.run import RunSource, find_runs
+from sccal.degrade.mcap import degrade_mcap
+from sccal.errors import DataError, Failure, SccalError, as_known
+from sccal.logs.outputs import require_apart, vehicle_place
+from sccal.logs.run import RunSource, find_runs, is_message_file
 
 
 def degrade_paths(
@@ -30,13 +32,16 @@ def degrade_paths(
         UsageError: a path that does not exist, or a place for the results that overlaps with the logs.
     """
     sources, failures = find_runs(paths)
-    _check_out(out, sources)
+    require_apart(out, sources, paths)
     degraded: list[DegradedRun] = []
     runs = {source.path for source in sources}
     for source in sources:
         try:
-            run = degrade_folder(source, out / source.name, faults, runs - {source.path})
-            _copy_vehicle(source, out)
+            if is_message_file(source.path):
+                run = _degrade_file(source, out, faults)
+            else:
+                run = degrade_folder(source, out / source.name, faults, runs - {source.path})
+                _copy_vehicle(source, out)
         except Exception as error:
             known = as_known(error)
             failures.append(Failure(source.name, known))
@@ -45,6 +50,19 @@ def degrade_paths(
         degraded.append(run)
         tell(source, run)
     return degraded, failures
+
+
+def _degrade_file(source: RunSource, out: Path, faults: Faults) -> DegradedRun:
+    suffix = source.path.suffix
+    if suffix.lower() != ".mcap":
+        raise DataError(f"{source.path}: of logs of messages only MCAP is degraded; `sccal convert` makes one of it")
+    name = source.name if source.name.endswith(suffix) else source.name + suffix
+    place, own = (None, False) if source.vehicle_toml is None else vehicle_place(source, out, out / source.name)
+    target = out / source.name / Path(name).name if own else out / name
+    run = degrade_mcap(source, target, faults)
+    if place is not None and source.vehicle_toml is not None and not place.exists():
+        _write(place, source.vehicle_toml.read_bytes())
+    return run
 
 
 def _copy_vehicle(source: RunSource, out: Path) -> None:
@@ -70,17 +88,3 @@ def _write(path: Path, text: bytes) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     temporary.write_bytes(text)
     temporary.replace(path)
-
-
-def _check_out(out: Path, sources: Sequence[RunSource]) -> None:
-    """Logs are never written among the logs that they come from."""
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"--out {out}: a file of that name is in the way")
-    real = [folder.resolve() for source in sources for folder in (source.path, source.searched_up_to or source.path)]
-    places = [(out, out.resolve()), *((out / source.name, (out / source.name).resolve()) for source in sources)]
-    for place, there in places:
-        for folder in real:
-            if there == folder or there in folder.parents or folder in there.parents:
-                raise UsageError(
-                    f"--out {out}: {place} overlaps with the logs in {folder}; name a folder outside of them"
-                )

@@ -8,7 +8,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.logs.streams import HeadingStream, Notice
-from sccal.logs.table import read_table
+from sccal.logs.table import Table, read_table
 
 _YAW = ("yaw_deg", "yaw_rad")
 _FURTHER = {
@@ -17,6 +17,8 @@ _FURTHER = {
     "yaw_sigma": ("yaw_sigma_deg", "yaw_sigma_rad"),
     "gyro_z": ("gyro_z_dps", "gyro_z_radps"),
 }
+AHRS_COLUMNS = ("t", *_YAW, *(name for pair in _FURTHER.values() for name in pair))
+"""The columns with a meaning; all others are further ones."""
 _DEGREE_LIKE_RAD = 50.0
 
 
@@ -26,7 +28,20 @@ def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file or missing columns.
     """
-    table = read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad")))
+    return heading_of_table(ahrs_table(path))
+
+
+def ahrs_table(path: Path) -> Table:
+    """The rows of an AHRS file that can be read, in order of time.
+
+    Raises:
+        DataError: unreadable file or missing columns.
+    """
+    return read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad")))
+
+
+def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:
+    """The heading in a table with the columns of ahrs.csv."""
     notices = list(table.notices)
     yaw_rad = _radians(table.columns, *_YAW)
     assert yaw_rad is not None
@@ -43,7 +58,6 @@ def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
             sigma_rad = np.where(unusable, np.nan, sigma_rad)
             what = "yaw sigmas of zero or less taken as not stated"
             notices.append(Notice(table.source, what, int(unusable.sum()), f"line {table.line[unusable][0]}"))
-    used = ["t", *_YAW, *(name for pair in _FURTHER.values() for name in pair)]
     stream = HeadingStream(
         t_s=table.columns["t"],
         yaw_rad=yaw_rad,
@@ -51,7 +65,7 @@ def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
         pitch_rad=further["pitch"],
         roll_rad=further["roll"],
         gyro_z_radps=further["gyro_z"],
-        extras=table.extras(used),
+        extras=table.extras(AHRS_COLUMNS),
     )
     return stream, tuple(notices)
 

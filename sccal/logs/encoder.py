@@ -14,6 +14,8 @@ from sccal.logs.table import Table, read_table
 
 _TICKS = ("t", "left_ticks", "right_ticks")
 _ANGLES = ("t", "left_rad", "right_rad")
+TRAVEL_UNKNOWN = "travel_unknown"
+"""A further column: 1 where the travel since the row before is not known well, as a log before repair showed."""
 _EXACT_LIMIT = 2.0**53
 _ANGLE_QUANTUM_RAD = 1e-3
 GAP_S = 0.5
@@ -26,7 +28,16 @@ def read_encoder(path: Path, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notic
     Raises:
         DataError: unreadable file, ticks without ``ticks_per_rev``, or counts that no motion explains.
     """
-    return repaired_wheels(read_table(path, (_TICKS, _ANGLES)), str(path), vehicle)
+    return repaired_wheels(encoder_table(path), str(path), vehicle)
+
+
+def encoder_table(path: Path) -> Table:
+    """The rows of an encoder file that can be read, in order of time, before any repair.
+
+    Raises:
+        DataError: unreadable file or missing columns.
+    """
+    return read_table(path, (_TICKS, _ANGLES))
 
 
 def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notice, ...]]:
@@ -58,6 +69,9 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         ) from error
     kept = table.keep(repaired.keep)
     loose = _loose(kept, repaired, scale, notices)
+    if TRAVEL_UNKNOWN in table.columns:
+        told = np.cumsum(np.nan_to_num(table.columns[TRAVEL_UNKNOWN]) > 0)[repaired.keep]
+        loose |= np.diff(told, prepend=0) > 0
     _tell(table, kept, repaired, bits, vehicle, notices)
     rad_per_count = 2 * np.pi / counts_per_turn
     stream = WheelStream(
@@ -65,7 +79,7 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         left_rad=repaired.counts[:, 0] * rad_per_count,
         right_rad=repaired.counts[:, 1] * rad_per_count,
         loose=loose,
-        extras=kept.extras(names),
+        extras=kept.extras((*names, TRAVEL_UNKNOWN)),
     )
     return stream, tuple(notices)
 

@@ -6,21 +6,44 @@ from pathlib import Path
 
 import numpy as np
 
-from sccal.arrays import Bools
+from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.streams import FixStream, Notice
-from sccal.logs.table import read_table
+from sccal.logs.table import Table, read_table
 
-_USED = ("t", "lat_deg", "lon_deg", "alt_m", "fix_quality", "sigma_m")
+GNSS_COLUMNS = (
+    *("t", "lat_deg", "lon_deg", "alt_m", "fix_quality", "sigma_m"),
+    *("sigma_east_m", "sigma_north_m", "cov_en_m2"),
+)
+"""The columns with a meaning; all others are further ones."""
 
 
 def read_gnss_csv(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     """Read fixes: ``t,lat_deg,lon_deg`` and optionally ``alt_m,fix_quality,sigma_m`` (horizontal, per axis).
 
+    Where axes differ, ``sigma_east_m,sigma_north_m,cov_en_m2`` say so and come before ``sigma_m``.
+
     Raises:
         DataError: unreadable file, missing columns, or no position in range.
     """
-    table = read_table(path, (("t", "lat_deg", "lon_deg"),))
+    return fixes_of_table(gnss_table(path), str(path))
+
+
+def gnss_table(path: Path) -> Table:
+    """The rows of a file of fixes that can be read, in order of time, those without a fix too.
+
+    Raises:
+        DataError: unreadable file or missing columns.
+    """
+    return read_table(path, (("t", "lat_deg", "lon_deg"),))
+
+
+def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ...]]:
+    """The fixes in a table with the columns of gnss.csv; ``path`` is for messages.
+
+    Raises:
+        DataError: no position in range.
+    """
     lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
     quality = table.columns.get("fix_quality", np.full(lat.size, np.nan))
     beyond: Bools = (np.abs(lat) > 90) | (np.abs(lon) > 360)
@@ -45,17 +68,24 @@ def read_gnss_csv(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     codes = np.where(np.isfinite(given) & (given >= 0) & (given <= 9), given, -1)
     sigma_m = table.columns.get("sigma_m", absent)
     sigma_m = np.where(sigma_m > 0, sigma_m, np.nan)
+    sigma_east_m, sigma_north_m = (_positive(table, f"sigma_{axis}_m", sigma_m) for axis in ("east", "north"))
+    lon = table.columns["lon_deg"]
     stream = FixStream(
         host_t_s=table.columns["t"],
         utc_s=absent,
         utc_has_date=False,
         lat_deg=table.columns["lat_deg"],
-        lon_deg=(table.columns["lon_deg"] + 180) % 360 - 180,
+        lon_deg=np.where(np.abs(lon) > 180, (lon + 180) % 360 - 180, lon),
         alt_m=table.columns.get("alt_m", absent),
         quality=np.round(codes).astype(np.int64),
-        sigma_east_m=sigma_m,
-        sigma_north_m=sigma_m,
-        cov_en_m2=np.zeros(n),
-        extras=table.extras(_USED),
+        sigma_east_m=sigma_east_m,
+        sigma_north_m=sigma_north_m,
+        cov_en_m2=np.nan_to_num(table.columns.get("cov_en_m2", np.zeros(n))),
+        extras=table.extras(GNSS_COLUMNS),
     )
     return stream, table.notices
+
+
+def _positive(table: Table, name: str, instead: Floats) -> Floats:
+    given = table.columns.get(name, instead)
+    return np.where(given > 0, given, instead)

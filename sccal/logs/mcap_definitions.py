@@ -29,6 +29,7 @@ _KNOWN_TEXTS = {
     "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id",
     "geometry_msgs/Quaternion": "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
     "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z",
+    "geometry_msgs/Vector3Stamped": _HEADER + "Vector3 vector",
     "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z",
     "geometry_msgs/Pose": "Point position\nQuaternion orientation",
     "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance",

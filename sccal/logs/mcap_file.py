@@ -26,8 +26,11 @@ from sccal.logs.streams import Notice
 
 Bytes = NDArray[np.uint8]
 
-_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _DATA_END = 2, 3, 4, 5, 6, 8, 15
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _CHUNK_INDEX, _METADATA, _DATA_END = 2, 3, 4, 5, 6, 8, 12, 15
 _HEAD_BYTES = 9
+RESULT_LIBRARY = "sccal calibrate"
+"""Named in the header of files that hold results, and so are no runs."""
+_LONGEST_HEADER = 1 << 16
 _MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
 _BATCH_BYTES = 1 << 20
 _BATCH_RECORDS = 200_000
@@ -57,8 +60,12 @@ OpenChannel = Callable[[Channel], Sink | None]
 """Gives the sink for a channel, or None where its messages are not wanted."""
 
 
-def read_mcap(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
+def read_mcap(
+    path: Path, open_channel: OpenChannel, metadata: dict[str, dict[str, str]] | None = None
+) -> tuple[Notice, ...]:
     """Hand every wanted message of the file to its channel's sink; tell what was broken.
+
+    ``metadata`` is filled with the file's metadata records by name.
 
     Raises:
         DataError: the file cannot be read, is empty, or is no MCAP file.
@@ -68,7 +75,18 @@ def read_mcap(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
         data = np.asarray(np.memmap(path, dtype=np.uint8, mode="r"))
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
-    return _Walk(path, data, open_channel).run()
+    return _Walk(path, data, open_channel, {} if metadata is None else metadata).run()
+
+
+def library_of(path: Path) -> str:
+    """What wrote the file, as its header says; empty where it says nothing or cannot be read."""
+    try:
+        with path.open("rb") as file:
+            begin = memoryview(file.read(_LONGEST_HEADER))
+        _, at = _text(begin, len(MAGIC) + _HEAD_BYTES)
+        return _text(begin, at)[0]
+    except (OSError, struct.error, ValueError):
+        return ""
 
 
 @dataclass
@@ -85,6 +103,7 @@ class _Walk:
     path: Path
     data: Bytes
     open_channel: OpenChannel
+    metadata: dict[str, dict[str, str]]
     schemas: dict[int, tuple[str, str, bytes]] = field(default_factory=dict)
     sinks: dict[int, Sink | None] = field(default_factory=dict)
     chunk_starts: list[int] = field(default_factory=list)
@@ -123,6 +142,8 @@ class _Walk:
                 self._chunk(view, position, begin, end, cut=False)
             elif opcode in (_SCHEMA, _CHANNEL):
                 self._declare(opcode, view[begin:end], position)
+            elif opcode == _METADATA:
+                self._keep_metadata(view[begin:end])
             elif opcode in (_DATA_END, _FOOTER):
                 ended = True
                 self._flush()
@@ -193,6 +214,18 @@ class _Walk:
             return
         name, schema_encoding, schema = self.schemas.get(schema_number, ("", "", b""))
         self.sinks[number] = self.open_channel(Channel(topic, name, encoding, schema_encoding, schema))
+
+    def _keep_metadata(self, record: memoryview) -> None:
+        try:
+            name, at = _text(record, 0)
+            (size,) = struct.unpack_from("<I", record, at)
+            at, last, entries = at + 4, at + 4 + size, {}
+            while at < last:
+                key, at = _text(record, at)
+                entries[key], at = _text(record, at)
+        except (struct.error, ValueError):
+            return
+        self.metadata.setdefault(name, entries)
 
     def _chunk(self, view: memoryview, position: int, begin: int, end: int, cut: bool) -> None:
         try:

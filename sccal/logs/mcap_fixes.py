@@ -11,14 +11,18 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
-from sccal.logs.mcap_topics import Messages
+from sccal.logs.mcap_topics import STAMPED, Messages
 from sccal.logs.mcap_wheels import of_messages
-from sccal.logs.nmea import parse_nmea
-from sccal.logs.streams import FixStream, Notice
+from sccal.logs.nmea import parse_nmea, parse_nmea_heading
+from sccal.logs.streams import FixStream, HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
 
 RTK_FIXED_M = 0.1
 """Between the 0.01 to 0.03 m that receivers state for RTK fixed and the 0.2 m and more for float."""
+
+
+_SMALL_S = 1e8
+_ONE_LINE = bytes.maketrans(b"\r\n", b"  ")
 
 
 def quality_of(status: Floats, sigma_m: Floats) -> Ints:
@@ -78,21 +82,55 @@ def fixes_of_positions(messages: Messages, path: str, source: str) -> tuple[FixS
     return stream, of_messages((*notices, *order_notices))
 
 
-def fixes_of_sentences(messages: Messages, path: str, source: str) -> tuple[FixStream, tuple[Notice, ...]]:
-    """Fixes of a topic of NMEA sentences; the messages' times are the receive times.
+def lines_of_sentences(messages: Messages, places: int | None = None) -> bytes:
+    """Sentences as lines of a gnss.nmea, each after its message's time to ``places`` decimals (None: enough of them).
+
+    Of a log that sccal converted (``places`` given), sentences without a stamp had no receive time and get none.
+    """
+    stamped = messages.column(STAMPED) != 0 if places is not None else np.ones(messages.t_s.size, dtype=np.bool_)
+    digits = 7 if places is None else places
+    if places is None and messages.t_s.size and np.abs(messages.t_s).max() < _SMALL_S:
+        digits = 9
+    lines = (
+        b"%s%s\n" % (b"%.*f " % (digits, t) if with_time else b"", text.strip().translate(_ONE_LINE))
+        for t, with_time, text in zip(messages.t_s.tolist(), stamped.tolist(), messages.texts, strict=True)
+    )
+    return b"".join(lines)
+
+
+def fixes_of_sentences(
+    messages: Messages, path: str, source: str, places: int | None = None
+) -> tuple[FixStream, tuple[Notice, ...]]:
+    """Fixes of a topic of NMEA sentences; the messages' times are the receive times (see lines_of_sentences).
 
     Raises:
         DataError: no sentence, or no fix.
     """
-    lines = (
-        b"%.7f %s\n" % (t, b" ".join(text.split()))
-        for t, text in zip(messages.t_s.tolist(), messages.texts, strict=True)
-    )
-    stream, notices = parse_nmea(b"".join(lines), source, path)
+    stream, notices = parse_nmea(lines_of_sentences(messages, places), source, path)
+    return stream, of_messages(notices)
+
+
+def heading_of_sentences(
+    messages: Messages, path: str, source: str, places: int | None = None
+) -> tuple[HeadingStream, tuple[Notice, ...]]:
+    """Headings of a topic of NMEA sentences.
+
+    Raises:
+        DataError: no sentence, or no heading.
+    """
+    stream, notices = parse_nmea_heading(lines_of_sentences(messages, places), source, path)
     return stream, of_messages(notices)
 
 
 _POSITIONS = (b"GGA,", b"RMC,", b"GNS,", b"GGK,", b"KSXT,")
+
+
+_HEADINGS = (b"HDT,", b"THS,", b"$PASHR,", b"$PTNL,AVR,", b"KSXT,")
+
+
+def has_headings(messages: Messages) -> bool:
+    """Whether a topic of sentences holds any that give a heading."""
+    return any(name in text for text in messages.texts for name in _HEADINGS)
 
 
 def has_positions(messages: Messages) -> bool:

@@ -105,6 +105,14 @@ class JsonGatherer:
             taken.clear()
 
 
+def found_ways(message: dict[str, Any]) -> tuple[dict[str, _Way], dict[str, _Way]]:
+    """The ways (keys and indices, one below the other) to the numbers and to the texts of a message, by dotted path."""
+    numbers: dict[str, _Way] = {}
+    texts: dict[str, tuple[_Way, str]] = {}
+    _flatten(message, "", (), numbers, texts)
+    return numbers, {path: way for path, (way, _) in texts.items()}
+
+
 def _took(plan: _Plan, message: Mapping[str, Any], number: int) -> bool:
     """Take the message by the plan, unless it does not fit."""
     try:

@@ -7,6 +7,7 @@ Encoding: https://protobuf.dev/programming-guides/encoding
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -207,3 +208,47 @@ class ProtobufWalker:
             shape.varints.append((begin, end))
         if len(shape.numbers) < MOST_FIELDS:
             shape.numbers[path] = Place(begin, end - begin, kind)
+
+
+def appended(walker: ProtobufWalker, path: str, value: float | bytes) -> bytes:
+    """A field, with the messages that it stands in, as bytes that take its place when they follow a message.
+
+    Raises:
+        MalformedError: the type has no such field, or it is repeated.
+    """
+    steps: list[tuple[int, _Field]] = []
+    name = walker.root
+    for step in path.split("."):
+        number, one = next(((n, f) for n, f in walker.messages.get(name, {}).items() if f.name == step), (0, None))
+        if one is None or one.repeated:
+            raise MalformedError(f"{path}: no single field of that name in {name}")
+        steps.append((number, one))
+        name = one.message
+    number, last = steps[-1]
+    if isinstance(value, bytes):
+        body = _tag(number, _BYTES) + _written(len(value)) + value
+    elif _KINDS[last.type] in ("varint", "zigzag"):
+        whole = round(value)
+        whole = (whole << 1) ^ (whole >> 63) if _KINDS[last.type] == "zigzag" else whole
+        body = _tag(number, _VARINT) + _written(whole & 0xFFFFFFFFFFFFFFFF)
+    else:
+        kind = _KINDS[last.type]
+        code = {"<f8": "<d", "<f4": "<f", "<u8": "<Q", "<u4": "<I", "<i4": "<i", "<i8": "<q"}[kind]
+        fixed = struct.pack(code, value if kind[1] == "f" else round(value))
+        body = _tag(number, _FIXED64 if kind[2] == "8" else _FIXED32) + fixed
+    for number, _ in reversed(steps[:-1]):
+        body = _tag(number, _BYTES) + _written(len(body)) + body
+    return body
+
+
+def _tag(number: int, wire: int) -> bytes:
+    return _written(number << 3 | wire)
+
+
+def _written(value: int) -> bytes:
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)

@@ -10,14 +10,26 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
+from sccal.logs.ahrs import heading_of_table
 from sccal.logs.bags import BAG_SUFFIXES, read_bag
+from sccal.logs.encoder import repaired_wheels
+from sccal.logs.gnss_csv import fixes_of_table
 from sccal.logs.mcap_file import read_mcap
-from sccal.logs.mcap_fixes import fixes_of_positions, fixes_of_sentences, has_positions
+from sccal.logs.mcap_fixes import (
+    fixes_of_positions,
+    fixes_of_sentences,
+    has_headings,
+    has_positions,
+    heading_of_sentences,
+    lines_of_sentences,
+)
 from sccal.logs.mcap_heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
+from sccal.logs.mcap_tables import ConversionNote, TableKind, note_of, table_of
 from sccal.logs.mcap_topics import FIELDS, Messages, Topics
 from sccal.logs.mcap_wheels import (
     joint_names,
     joints_of,
+    of_messages,
     wheels_of_joints,
     wheels_of_odometry,
     wheels_of_paths,
@@ -25,6 +37,7 @@ from sccal.logs.mcap_wheels import (
 )
 from sccal.logs.options import ReadOptions
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
+from sccal.logs.table import Table
 
 MESSAGE_SUFFIXES = (".mcap", *BAG_SUFFIXES)
 """Files that are runs on their own."""
@@ -42,6 +55,14 @@ class _Log:
     seen: Mapping[str, str]
     """Type by topic."""
     found: Mapping[str, Messages]
+    note: ConversionNote | None = None
+    """Of a log that sccal converted."""
+
+    def table(self, kind: TableKind, *choices: str) -> Table | None:
+        """A converted log's table, unless any of the ``choices`` asks for something else."""
+        if self.note is None or any(choices):
+            return None
+        return table_of(kind, self.note, self.found, self.path.name, self.vehicle.convention)
 
     def where(self, topic: str) -> str:
         """The topic as errors name it."""
@@ -71,25 +92,79 @@ def read_message_log(
         DataError: the file cannot be read, or lacks a stream, or holds several and nothing says which.
         UsageError: an option that is no ``TOPIC:path``, or half of a pair.
     """
-    asked = _asked_paths(options)
-    topics = Topics(asked)
-    notices = (read_mcap if path.suffix.lower() == ".mcap" else read_bag)(path, topics.open)
-    found, unread = topics.messages(path.name, options.time)
-    log = _Log(path, options, vehicle, topics.seen, found)
-    if not topics.seen:
-        why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
-        raise DataError(f"{path}: no message can be read: {why}")
+    log, notices = _opened(path, vehicle, options)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # whatever numbers broken bytes hold
             wheels, wheel_notices, wheel_topics = _wheels(log)
             heading, heading_notices, heading_topics = _heading(log)
             fixes, fix_notices, fix_topics = _fixes(log)
     except DataError as error:
-        lost = "; ".join(str(notice) for notice in (*notices, *unread))
+        lost = "; ".join(str(notice) for notice in notices)
         raise DataError(f"{error} ({lost})") if lost else error from None
     _require_common_time(log, wheel_topics[0], heading_topics[0], fix_topics[0])
-    wheels = with_series(wheels, _further_columns(found))
-    return wheels, heading, fixes, (*notices, *unread, *wheel_notices, *heading_notices, *fix_notices)
+    own = log.note.side_topics if log.note else set()
+    wheels = with_series(wheels, _further_columns({name: m for name, m in log.found.items() if name not in own}))
+    return wheels, heading, fixes, (*notices, *wheel_notices, *heading_notices, *fix_notices)
+
+
+def _opened(path: Path, vehicle: Vehicle, options: ReadOptions) -> tuple[_Log, tuple[Notice, ...]]:
+    topics = Topics(_asked_paths(options))
+    metadata: dict[str, dict[str, str]] = {}
+    in_mcap = path.suffix.lower() == ".mcap"
+    notices = read_mcap(path, topics.open, metadata) if in_mcap else read_bag(path, topics.open)
+    if not topics.seen:
+        why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
+        raise DataError(f"{path}: no message can be read: {why}")
+    note = note_of(metadata)
+    found, unread = topics.messages(path.name, options.time, note.log_ahead_ns if note else 0)
+    told = note.notices if note else ()
+    return _Log(path, options, vehicle, topics.seen, found, note), (*notices, *unread, *told)
+
+
+@dataclass(frozen=True)
+class LoggedTables:
+    """What a log of messages holds as it was before any repair; None for what it holds in another form."""
+
+    encoder: Table | None
+    ahrs: Table | None
+    gnss: Table | None
+    nmea: bytes | None
+    """The lines of the topic that the fixes are read from."""
+    note: ConversionNote
+    """What was noted when the log was converted; empty for others."""
+
+
+def read_tables(path: Path, vehicle: Vehicle, options: ReadOptions) -> LoggedTables:
+    """The tables of a log that sccal converted, and the NMEA lines of any, as read_message_log takes them.
+
+    Raises:
+        DataError, UsageError: as read_message_log.
+    """
+    log, _ = _opened(path, vehicle, options)
+    _, _, (topic,) = _fixes(log)
+    messages = log.found[topic]
+    sentences = messages.kind == "Sentence"
+    return LoggedTables(
+        encoder=_encoder_table(log),
+        ahrs=_ahrs_table(log),
+        gnss=None if sentences else _gnss_table(log),
+        nmea=lines_of_sentences(messages, _places(log, topic)) if sentences else None,
+        note=log.note or ConversionNote(),
+    )
+
+
+def _encoder_table(log: _Log) -> Table | None:
+    options = log.options
+    return log.table("encoder", options.wheels_topic, options.left_joint, options.left_ticks, options.left_rad)
+
+
+def _ahrs_table(log: _Log) -> Table | None:
+    options = log.options
+    return log.table("ahrs", options.heading_topic, options.yaw, options.orientation.removeprefix("enu"))
+
+
+def _gnss_table(log: _Log) -> Table | None:
+    return log.table("gnss", log.options.fix_topic, log.options.latitude)
 
 
 def _asked_paths(options: ReadOptions) -> dict[str, list[str]]:
@@ -181,6 +256,11 @@ def _wheels(log: _Log) -> tuple[WheelStream, tuple[Notice, ...], tuple[str, ...]
             topic = left[0].topic
             stream, notices = wheels_of_paths(left, right, unit, log.vehicle, log.where(topic), log.source(topic))
             return stream, notices, (topic, right[0].topic)
+    table = _encoder_table(log)
+    if table is not None and log.note is not None:
+        topic = log.note.tables["encoder"].topic
+        stream, notices = repaired_wheels(table, log.where(topic), log.vehicle)
+        return stream, of_messages(notices), (topic,)
     joints = [m for m in log.found.values() if m.kind == "JointState"]
     ranks = [("JointState", lambda m: joints_of(m, options) is not None), ("Odometry", _always)]
     instead = "--left-ticks TOPIC:path and --right-ticks TOPIC:path"
@@ -215,13 +295,21 @@ def _heading(log: _Log) -> tuple[HeadingStream, tuple[Notice, ...], tuple[str, .
         )
         return stream, notices, (messages.topic,)
 
+    table = _ahrs_table(log)
+    if table is not None and log.note is not None:
+        stream, notices = heading_of_table(table)
+        return stream, of_messages(notices), (log.note.tables["ahrs"].topic,)
+
     def oriented(messages: Messages) -> bool:
         return bool(has_orientation(messages).any())
 
     ranks = [("Imu", oriented), ("QuaternionStamped", oriented), ("MagneticField", _always)]
+    ranks.append(("Sentence", has_headings))
     messages, tell = _chosen(log, "heading", "--heading-topic", options.heading_topic, ranks, "--yaw TOPIC:path")
     where, source = log.where(messages.topic), log.source(messages.topic)
-    if messages.kind == "MagneticField":
+    if messages.kind == "Sentence":
+        stream, notices = heading_of_sentences(messages, where, source, _places(log, messages.topic))
+    elif messages.kind == "MagneticField":
         stream, notices = heading_of_field(messages, _levelling_imu(log), log.vehicle, where, source)
     else:
         stream, notices = heading_of_quaternions(messages, options.orientation, log.vehicle, where, source)
@@ -245,6 +333,12 @@ def _fixes(log: _Log) -> tuple[FixStream, tuple[Notice, ...], tuple[str, ...]]:
         stream, notices = fixes_of_positions(positions, log.where(messages.topic), log.source(messages.topic))
         return stream, notices, (messages.topic,)
 
+    table = _gnss_table(log)
+    if table is not None and log.note is not None:
+        topic = log.note.tables["gnss"].topic
+        stream, notices = fixes_of_table(table, log.where(topic))
+        return stream, of_messages(notices), (topic,)
+
     def positions_in(messages: Messages) -> bool:
         return bool(np.isfinite(messages.column("latitude")).any())
 
@@ -256,9 +350,18 @@ def _fixes(log: _Log) -> tuple[FixStream, tuple[Notice, ...], tuple[str, ...]]:
     ]
     instead = "--latitude TOPIC:path and --longitude TOPIC:path"
     messages, tell = _chosen(log, "fixes", "--fix-topic", options.fix_topic, ranks, instead)
-    read = fixes_of_sentences if messages.kind == "Sentence" else fixes_of_positions
-    stream, notices = read(messages, log.where(messages.topic), log.source(messages.topic))
+    where, source = log.where(messages.topic), log.source(messages.topic)
+    if messages.kind == "Sentence":
+        stream, notices = fixes_of_sentences(messages, where, source, _places(log, messages.topic))
+    else:
+        stream, notices = fixes_of_positions(messages, where, source)
     return stream, (*tell, *notices), (messages.topic,)
+
+
+def _places(log: _Log, topic: str) -> int | None:
+    """Decimals of the receive times of a converted log's sentences; None for other logs and times."""
+    converted = log.note is not None and topic == log.note.nmea_topic and log.options.time == "header"
+    return log.note.nmea_places if log.note is not None and converted else None
 
 
 def _require_common_time(log: _Log, *topics: str) -> None:

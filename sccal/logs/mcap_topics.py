@@ -6,6 +6,7 @@ with or without underscores.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -61,6 +62,8 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
 _STAMPS = ("header.stamp", "stamp", "timestamp", "header.timestamp", "time")
 _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos", "nanosecs", "nanoseconds")
+STAMPED = "stamped"
+"""Column of sentences: 1 where the message has a stamp of its own."""
 _NO_CAUSE = re.compile(
     "(geometry|nav|tf2|visualization|map|trajectory|shape|stereo|diagnostic|statistics|action|actionlib|lifecycle"
     "|foxglove|rosgraph)_msgs|tf|foxglove|rcl_interfaces|builtin_interfaces"
@@ -174,7 +177,7 @@ class Topics:
         picker = _picker(kind, asked)
         try:
             gatherer = (
-                JsonGatherer(picker) if channel.message_encoding == "json" else Gatherer(_walker(channel), picker)
+                JsonGatherer(picker) if channel.message_encoding == "json" else Gatherer(walker_of(channel), picker)
             )
         except MalformedError as error:
             if kind or asked:
@@ -184,8 +187,13 @@ class Topics:
         self.sinks.setdefault(channel.topic, []).append(sink)
         return sink
 
-    def messages(self, source: str, time: TimeSource) -> tuple[dict[str, Messages], list[Notice]]:
-        """The messages of every topic that was opened and has any, and what could not be read."""
+    def messages(
+        self, source: str, time: TimeSource, log_ahead_ns: int = 0
+    ) -> tuple[dict[str, Messages], list[Notice]]:
+        """The messages of every topic that was opened and has any, and what could not be read.
+
+        ``log_ahead_ns`` is how far the log times are ahead of the logging computer's clock (see mcap_tables).
+        """
         found: dict[str, Messages] = {}
         notices = [
             Notice(source, f"topics not read: {topic}: {why}", 1, severity="warning")
@@ -196,7 +204,7 @@ class Topics:
             own = [s for s, kind in zip(sinks, kinds, strict=True) if kind == kinds[0] and not s.given_up]
             if not own:
                 continue
-            messages = _collected(topic, kinds[0], own, f"{source} {topic}", time, notices)
+            messages = _collected(topic, kinds[0], own, f"{source} {topic}", time, notices, log_ahead_ns)
             if messages.t_s.size:
                 found[topic] = messages
         return found, notices
@@ -209,7 +217,9 @@ def _may_be_cause(type_name: str) -> bool:
     return _NO_CAUSE.fullmatch(package) is None
 
 
-def _walker(channel: Channel) -> Walker:
+@functools.cache
+def walker_of(channel: Channel) -> Walker:
+    """What walks the messages of a channel, by its own definitions. Raises MalformedError where they cannot be read."""
     encoding = channel.message_encoding
     if encoding == "protobuf":
         messages = parse_descriptors(channel.schema)
@@ -274,7 +284,13 @@ def _stamp(by_name: Mapping[str, str]) -> tuple[str, str] | None:
 
 
 def _collected(
-    topic: str, kind: str, sinks: Sequence[ChannelSink], source: str, time: TimeSource, notices: list[Notice]
+    topic: str,
+    kind: str,
+    sinks: Sequence[ChannelSink],
+    source: str,
+    time: TimeSource,
+    notices: list[Notice],
+    log_ahead_ns: int,
 ) -> Messages:
     """The columns of one topic's channels, joined and in order of log time."""
     count = sum(sink.count for sink in sinks)
@@ -303,10 +319,12 @@ def _collected(
         first += sink.count
     log_ns = np.concatenate([ns for sink in sinks for ns in sink.log_ns] or [np.zeros(0, dtype=np.int64)])
     publish_ns = np.concatenate([ns for sink in sinks for ns in sink.publish_ns] or [np.zeros(0, dtype=np.int64)])
-    chosen_ns = log_ns if time == "log" else publish_ns if time == "publish" else stamp_ns
+    chosen_ns = (log_ns if time == "log" else publish_ns) - log_ahead_ns if time != "header" else stamp_ns
     if time == "header":
         unset = stamp_ns == 0
-        chosen_ns = np.where(unset, np.where(log_ns != 0, log_ns, publish_ns), stamp_ns)
+        chosen_ns = np.where(unset, np.where(log_ns != 0, log_ns, publish_ns) - log_ahead_ns, stamp_ns)
+        if kind == "Sentence":
+            values[STAMPED] = np.where(unset, 0.0, 1.0)
         if unset.any() and not unset.all():
             where = f"message {int(np.flatnonzero(unset)[0]) + 1}"
             notices.append(

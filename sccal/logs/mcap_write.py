@@ -10,7 +10,7 @@ import os
 import re
 import struct
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,9 +21,9 @@ from sccal.arrays import Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.mcap_definitions import full_text, known_definitions
 from sccal.logs.mcap_ros import RosWalker
+from sccal.logs.mcap_tables import LEFT_JOINT, RIGHT_JOINT
 from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream
 
-LEFT_JOINT, RIGHT_JOINT = "left_wheel_joint", "right_wheel_joint"
 WHEELS_TOPIC, HEADING_TOPIC, FIX_TOPIC, NMEA_TOPIC = "/joint_states", "/imu/data", "/fix", "/nmea_sentence"
 _STATUS = {0: -1, 2: 1, 3: 1, 9: 1, 4: 2, 5: 2}
 """NavSatStatus by GGA quality; 0, a fix, for all others."""
@@ -38,6 +38,15 @@ class Stamped:
     type_name: str
     stamp_ns: Ints
     messages: list[bytes]
+    log_ns: Ints | None = None
+    """When each was logged; None for the stamps."""
+    definition: str = ""
+    """Of the type; empty for those that sccal knows."""
+
+    @property
+    def log_times_ns(self) -> Ints:
+        """(n) log times."""
+        return self.stamp_ns if self.log_ns is None else self.log_ns
 
 
 def write_mcap(run: Run, path: Path, nmea: bytes | None = None, compression: str = "zstd") -> None:
@@ -46,24 +55,49 @@ def write_mcap(run: Run, path: Path, nmea: bytes | None = None, compression: str
     Raises:
         DataError: ``nmea`` holds no sentence with a receive time; times before 1970-01-01 (negative ones).
     """
-    from mcap.writer import CompressionType, Writer
-
     topics = [joint_states(run.wheels), imu(run.heading, run.vehicle.convention)]
     topics.append(nav_sat_fixes(run.fixes) if nmea is None else sentences(nmea, path))
     topics += _further(run)
-    if min(int(topic.stamp_ns.min()) for topic in topics if topic.stamp_ns.size) < 0:
+    write_topics(path, topics, compression=compression)
+
+
+def write_topics(
+    path: Path,
+    topics: Sequence[Stamped],
+    metadata: Mapping[str, Mapping[str, str]] | None = None,
+    attachments: Mapping[str, tuple[str, bytes]] | None = None,
+    compression: str = "zstd",
+    library: str = "sccal",
+) -> None:
+    """Write topics in order of log time, whole or not at all; the same bytes every time.
+
+    ``attachments`` are media type and content by name. They and ``metadata`` (by name) stand before the messages, where
+    a cut file still has them.
+
+    Raises:
+        DataError: log times before 1970-01-01 (negative ones).
+    """
+    from mcap.writer import CompressionType, Writer
+
+    if min((int(topic.log_times_ns.min()) for topic in topics if topic.stamp_ns.size), default=0) < 0:
         raise DataError(f"{path}: the run has times below zero, which MCAP cannot hold")
     kind = {"": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}[compression]
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
             writer = Writer(file, compression=kind)
-            writer.start(profile="ros2", library="sccal")
+            writer.start(profile="ros2", library=library)
+            for name, entries in (metadata or {}).items():
+                writer.add_metadata(name, dict(entries))
+            for name, (media_type, content) in (attachments or {}).items():
+                writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=content)
             channels = []
+            schemas: dict[str, int] = {}
             for topic in topics:
-                text = full_text(topic.type_name.replace("/msg/", "/")).encode()
-                schema = writer.register_schema(topic.type_name, "ros2msg", text)
-                channels.append(writer.register_channel(topic.topic, "cdr", schema))
+                if topic.type_name not in schemas:
+                    text = topic.definition or full_text(topic.type_name.replace("/msg/", "/"))
+                    schemas[topic.type_name] = writer.register_schema(topic.type_name, "ros2msg", text.encode())
+                channels.append(writer.register_channel(topic.topic, "cdr", schemas[topic.type_name]))
             for number, (ns, which, message) in enumerate(_in_order(topics)):
                 writer.add_message(channels[which], log_time=ns, publish_time=ns, data=message, sequence=number)
             writer.finish()  # type: ignore[no-untyped-call]
@@ -78,11 +112,17 @@ def joint_states(wheels: WheelStream) -> Stamped:
     """The wheels' cumulative angles as positions of two joints."""
     texts = {"header.frame_id": "base_link", "name[0]": LEFT_JOINT, "name[1]": RIGHT_JOINT}
     numbers = {"position[0]": wheels.left_rad, "position[1]": wheels.right_rad}
-    return _encoded(WHEELS_TOPIC, "sensor_msgs/msg/JointState", wheels.t_s, texts, {"name": 2, "position": 2}, numbers)
+    return encoded(WHEELS_TOPIC, "sensor_msgs/msg/JointState", wheels.t_s, texts, {"name": 2, "position": 2}, numbers)
 
 
 def imu(heading: HeadingStream, convention: str) -> Stamped:
     """The heading as orientations in ROS's east, north, up; angles that the AHRS does not give are zero."""
+    numbers = imu_numbers(heading, convention)
+    return encoded(HEADING_TOPIC, "sensor_msgs/msg/Imu", heading.t_s, {"header.frame_id": "base_link"}, {}, numbers)
+
+
+def imu_numbers(heading: HeadingStream, convention: str) -> dict[str, Floats]:
+    """The fields (n) of those messages by path."""
     yaw = heading.yaw_rad if convention == "enu" else 0.5 * np.pi - heading.yaw_rad
     zero = np.zeros(yaw.size)
     pitch = zero if heading.pitch_rad is None else -np.nan_to_num(heading.pitch_rad)
@@ -102,14 +142,20 @@ def imu(heading: HeadingStream, convention: str) -> Stamped:
         numbers["angular_velocity_covariance[0]"] = zero - 1.0
     else:
         numbers["angular_velocity.z"] = heading.gyro_z_radps
-    return _encoded(HEADING_TOPIC, "sensor_msgs/msg/Imu", heading.t_s, {"header.frame_id": "base_link"}, {}, numbers)
+    return numbers
 
 
 def nav_sat_fixes(fixes: FixStream) -> Stamped:
     """The fixes, stamped with the receive time where there is one, else with the receiver's epoch."""
     t_s = np.where(np.isfinite(fixes.host_t_s), fixes.host_t_s, fixes.utc_s)
+    frame = {"header.frame_id": "gnss"}
+    return encoded(FIX_TOPIC, "sensor_msgs/msg/NavSatFix", t_s, frame, {}, nav_sat_numbers(fixes))
+
+
+def nav_sat_numbers(fixes: FixStream) -> dict[str, Floats]:
+    """The fields (n) of those messages by path."""
     stated = np.isfinite(fixes.sigma_east_m) & np.isfinite(fixes.sigma_north_m)
-    numbers = {
+    return {
         "status.status": np.array([_STATUS.get(code, 0) for code in fixes.quality.tolist()], dtype=np.float64),
         "latitude": fixes.lat_deg,
         "longitude": fixes.lon_deg,
@@ -120,7 +166,6 @@ def nav_sat_fixes(fixes: FixStream) -> Stamped:
         "position_covariance[4]": np.where(stated, fixes.sigma_north_m**2, 0.0),
         "position_covariance_type": np.where(stated, 3.0, 0.0),
     }
-    return _encoded(FIX_TOPIC, "sensor_msgs/msg/NavSatFix", t_s, {"header.frame_id": "gnss"}, {}, numbers)
 
 
 def sentences(nmea: bytes, path: Path) -> Stamped:
@@ -132,12 +177,17 @@ def sentences(nmea: bytes, path: Path) -> Stamped:
     if not found:
         raise DataError(f"{path}: no NMEA sentence has a receive time before it; write the fixes instead")
     stamp_ns = nanoseconds_of(np.array([t for t, _ in found]))
+    return sentence_messages(stamp_ns, [text for _, text in found])
+
+
+def sentence_messages(stamp_ns: Ints, texts: Sequence[bytes], log_ns: Ints | None = None) -> Stamped:
+    """Sentences (n) as messages with these stamps (n); a stamp of 0 is none."""
     messages = []
-    for ns, (_, text) in zip(stamp_ns.tolist(), found, strict=True):
+    for ns, text in zip(stamp_ns.tolist(), texts, strict=True):
         head = struct.pack("<4BiI", 0, 1, 0, 0, *divmod(ns, 1_000_000_000)) + struct.pack("<I5s", 5, b"gnss\0")
         head += bytes(-(len(head) - 4) % 4)
         messages.append(head + struct.pack("<I", len(text) + 1) + text + b"\0")
-    return Stamped(NMEA_TOPIC, "nmea_msgs/msg/Sentence", stamp_ns, messages)
+    return Stamped(NMEA_TOPIC, "nmea_msgs/msg/Sentence", stamp_ns, messages, log_ns)
 
 
 def _further(run: Run) -> Iterator[Stamped]:
@@ -146,29 +196,32 @@ def _further(run: Run) -> Iterator[Stamped]:
         for name, column in extras.items():
             rows = np.isfinite(column)
             topic = "/" + re.sub(r"\W+", "_", name)
-            yield _encoded(topic, "std_msgs/msg/Float64", t_s[rows], {}, {}, {"data": column[rows]})
+            yield encoded(topic, "std_msgs/msg/Float64", t_s[rows], {}, {}, {"data": column[rows]})
 
 
-def _encoded(
+def encoded(
     topic: str,
     type_name: str,
-    t_s: Floats,
+    times: Floats,
     texts: Mapping[str, str],
     counts: Mapping[str, int],
     numbers: Mapping[str, Floats],
 ) -> Stamped:
-    """Messages of one layout: ``texts`` by path, lengths of sequences by path, and columns (n) of numbers by path."""
+    """Messages of one layout: ``texts`` by path, lengths of sequences by path, and columns (n) of numbers by path.
+
+    ``times`` (n) are seconds.
+    """
     root = type_name.replace("/msg/", "/")
     blank = _Blank(texts, counts).encoded(root)
     places = RosWalker(known_definitions(), root).shape(blank).numbers
-    stamp_ns = nanoseconds_of(t_s)
-    rows: NDArray[np.uint8] = np.tile(np.frombuffer(blank, dtype=np.uint8), (t_s.size, 1))
+    stamp_ns = nanoseconds_of(times)
+    rows: NDArray[np.uint8] = np.tile(np.frombuffer(blank, dtype=np.uint8), (times.size, 1))
     columns: dict[str, Floats | Ints] = dict(numbers)
     if "header.stamp.sec" in places:
         columns |= {"header.stamp.sec": stamp_ns // 1_000_000_000, "header.stamp.nanosec": stamp_ns % 1_000_000_000}
     for name, column in columns.items():
         place = places[name]
-        values = np.ascontiguousarray(column.astype(place.kind)).view(np.uint8).reshape(t_s.size, place.width)
+        values = np.ascontiguousarray(column.astype(place.kind)).view(np.uint8).reshape(times.size, place.width)
         rows[:, place.offset : place.offset + place.width] = values
     return Stamped(topic, type_name, stamp_ns, [row.tobytes() for row in rows])
 
@@ -220,11 +273,11 @@ def nanoseconds_of(t_s: Floats) -> Ints:
     return whole.astype(np.int64) * 1_000_000_000 + np.round((t_s - whole) * 1e9).astype(np.int64)
 
 
-def _in_order(topics: list[Stamped]) -> Iterator[tuple[int, int, bytes]]:
+def _in_order(topics: Sequence[Stamped]) -> Iterator[tuple[int, int, bytes]]:
     """Stamp, topic and message of all topics in order of time."""
-    ns = np.concatenate([topic.stamp_ns for topic in topics])
+    ns = np.concatenate([topic.log_times_ns for topic in topics] or [np.empty(0, dtype=np.int64)])
     which = np.repeat(np.arange(len(topics)), [topic.stamp_ns.size for topic in topics])
-    row = np.concatenate([np.arange(topic.stamp_ns.size) for topic in topics])
+    row = np.concatenate([np.arange(topic.stamp_ns.size) for topic in topics] or [np.empty(0, dtype=np.int64)])
     order = np.argsort(ns, kind="stable")
     for at, topic, i in zip(ns[order].tolist(), which[order].tolist(), row[order].tolist(), strict=True):
         yield at, topic, topics[topic].messages[i]

@@ -70,13 +70,18 @@ def read_reference_rows(path: Path) -> ReferenceRows:
     )
 
 
-def read_reference(folder: Path, fixes: FixStream) -> Reference | None:
-    """The reference of the log in a folder, whose fixes are ``fixes``; None where it was not degraded.
+def beside(run: Path, name: str) -> Path:
+    """Where a run's REFERENCE_FILE or MANIFEST_FILE stands: in its folder, or after the name of its file."""
+    return run / name if run.is_dir() else run.with_name(f"{run.name}.{name}")
+
+
+def read_reference(run: Path, fixes: FixStream) -> Reference | None:
+    """The reference of the run in a folder or file, whose fixes are ``fixes``; None where it was not degraded.
 
     Raises DataError where the file is damaged.
     """
-    path = folder / REFERENCE_FILE
-    if not path.is_file() or not (folder / MANIFEST_FILE).is_file():
+    path = beside(run, REFERENCE_FILE)
+    if not path.is_file() or not beside(run, MANIFEST_FILE).is_file():
         return None
     rows = read_reference_rows(path)
     if not (rows.lost | rows.displaced).any():

@@ -13,6 +13,7 @@ from sccal.logs.ahrs import read_ahrs
 from sccal.logs.bags import bag_folder_files
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
+from sccal.logs.mcap_file import RESULT_LIBRARY, library_of
 from sccal.logs.mcap_run import MESSAGE_SUFFIXES, read_message_log
 from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.options import ReadOptions
@@ -52,7 +53,7 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     seen: set[Path] = set()
     for path in paths:
         root = _root(path)
-        places = [path] if _is_message_file(path) else _run_places(root)
+        places = [path] if is_message_file(path) else _run_places(root)
         sources = [
             RunSource(_name_below(root, place), place, _nearest_vehicle(_folder_of(place), root), root)
             for place in sorted(places, key=lambda place: _natural(place.relative_to(root)))
@@ -104,7 +105,7 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
         raise DataError(
             f"{source.path}: lacks {', '.join(missing)}; found {', '.join(there) or 'none of the run files'}"
         )
-    vehicle, notices = read_vehicle(_vehicle_toml(source))
+    vehicle, notices = read_vehicle(vehicle_of(source))
     wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)
     _require_rows(source.path / "encoder.csv", wheels.t_s.size, wheel_notices)
     heading, heading_notices = _read_heading(source.path, there)
@@ -142,14 +143,16 @@ def _read_heading(folder: Path, there: Sequence[str]) -> tuple[HeadingStream, tu
 
 
 def _read_message_run(source: RunSource, options: ReadOptions) -> Run:
-    vehicle, notices = read_vehicle(_vehicle_toml(source))
+    vehicle, notices = read_vehicle(vehicle_of(source))
     wheels, heading, fixes, found = read_message_log(source.path, vehicle, options)
     for what, count in (("wheels", wheels.t_s), ("heading", heading.t_s), ("fixes", fixes.lat_deg)):
         _require_rows(f"{source.path} ({what})", count.size, found)
-    return Run(source.name, source.path, vehicle, wheels, heading, fixes, (*notices, *found))
+    reference = read_reference(source.path, fixes)
+    return Run(source.name, source.path, vehicle, wheels, heading, fixes, (*notices, *found), reference)
 
 
-def _vehicle_toml(source: RunSource) -> Path:
+def vehicle_of(source: RunSource) -> Path:
+    """The vehicle.toml that applies to a run. Raises DataError where there is none."""
     if source.vehicle_toml is None:
         raise DataError(
             f"{source.path}: no vehicle.toml here or above, up to {source.searched_up_to or source.path}; "
@@ -169,7 +172,7 @@ def _root(path: Path) -> Path:
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir():
         return path
-    if path.name in (*RUN_FILES, "vehicle.toml") or _is_message_file(path):
+    if path.name in (*RUN_FILES, "vehicle.toml") or is_message_file(path):
         return path.parent
     raise DataError(
         f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
@@ -179,14 +182,16 @@ def _root(path: Path) -> Path:
 
 def is_message_log(path: Path) -> bool:
     """Whether a run's path is a log of messages (a file, or a bag's folder), not a folder of CSV and NMEA files."""
-    return _is_message_file(path) or _is_bag_folder(path)
+    return is_message_file(path) or is_bag_folder(path)
 
 
-def _is_message_file(path: Path) -> bool:
+def is_message_file(path: Path) -> bool:
+    """Whether a path is a file that is a run on its own."""
     return path.suffix.lower() in MESSAGE_SUFFIXES and path.is_file()
 
 
-def _is_bag_folder(path: Path) -> bool:
+def is_bag_folder(path: Path) -> bool:
+    """Whether a path is a rosbag2 folder."""
     return (
         path.is_dir()
         and not any((path / name).is_file() for name in RUN_FILES)
@@ -216,7 +221,9 @@ def _run_places(root: Path) -> Iterator[Path]:
         for name in files:
             suffix = Path(name).suffix.lower()
             if suffix in MESSAGE_SUFFIXES and not name.startswith(".") and not (bag and suffix == ".db3"):
-                yield Path(folder) / name
+                path = Path(folder) / name
+                if suffix != ".mcap" or not path.is_file() or library_of(path) != RESULT_LIBRARY:
+                    yield path
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:

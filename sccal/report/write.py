@@ -9,8 +9,11 @@ from pathlib import Path
 from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.logs.write import write_text
 from sccal.report.as_json import calibration_json, json_text, vehicle_json
+from sccal.report.calibration_mcap import write_calibration_mcap
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
+
+MCAP_FILE = "calibration.mcap"
 
 
 def begin_loading() -> None:
@@ -27,12 +30,16 @@ def write_numbers(c: Calibration, folder: Path) -> None:
     write_text(folder / "ros2_control.yaml", ros2_control_yaml(c))
 
 
-def write_calibration(c: Calibration, folder: Path) -> None:
-    """The five files of a run."""
+def write_calibration(c: Calibration, folder: Path, with_mcap: bool = False) -> None:
+    """The five files of a run, and its calibration.mcap where that is wanted."""
     from sccal.report.html import run_html
 
     write_numbers(c, folder)
     write_text(folder / "report.html", run_html(c))
+    if with_mcap:
+        write_calibration_mcap(c, folder / MCAP_FILE)
+    else:
+        (folder / MCAP_FILE).unlink(missing_ok=True)
 
 
 def write_vehicle(v: VehicleCalibration, out: Path, stem: str = "vehicle") -> None:

@@ -1,0 +1,185 @@
+"""All runs of one call, converted one by one, in the layout in which they were found.
+
+A run found at LOGS/a/b becomes OUT/a/b.mcap or the folder OUT/a/b, and the vehicle.toml that applies to it goes to the
+place that corresponds. Where another vehicle's stands there, the run gets a folder of its own: OUT/a/b/b.mcap.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from sccal import __version__
+from sccal.convert.from_folder import tables_of_folder
+from sccal.convert.from_messages import tables_of_messages
+from sccal.convert.tables import NOTE_FILE, RunTables
+from sccal.convert.to_folder import write_folder_of
+from sccal.convert.to_mcap import LIBRARY, write_mcap_of
+from sccal.errors import DataError, Failure, SccalError, UsageError, as_known
+from sccal.logs.mcap_file import library_of
+from sccal.logs.mcap_tables import SCHEMA
+from sccal.logs.options import ReadOptions
+from sccal.logs.outputs import require_apart, vehicle_place
+from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
+from sccal.logs.run import RUN_FILES, RunSource, find_runs, is_bag_folder, is_message_file, vehicle_of
+from sccal.logs.streams import Notice
+from sccal.logs.write import write_bytes
+
+Form = Literal["mcap", "folder"]
+
+
+@dataclass(frozen=True)
+class ConvertedRun:
+    """What was written for one run."""
+
+    name: str
+    path: Path
+    notices: tuple[Notice, ...]
+
+
+def convert_paths(
+    paths: Sequence[Path],
+    out: Path,
+    form: Form | None,
+    options: ReadOptions,
+    tell: Callable[[RunSource, ConvertedRun | SccalError], None],
+) -> tuple[list[ConvertedRun], list[Failure]]:
+    """Convert every run below the paths into out; gives what was written, and what could not be.
+
+    ``form`` None: folders and ROS bags become MCAP, MCAP becomes a folder. ``tell`` is called after each run.
+
+    Raises:
+        UsageError: a path that does not exist, or a place for the results that overlaps with the logs.
+    """
+    sources, failures = find_runs(paths)
+    require_apart(out, sources, paths)
+    inputs = {source.path.resolve() for source in sources}
+    converted: list[ConvertedRun] = []
+    for source in sources:
+        try:
+            run = _convert(source, out, form or _other_form(source), options, inputs)
+        except Exception as error:
+            known = as_known(error)
+            failures.append(Failure(source.name, known))
+            tell(source, known)
+            continue
+        converted.append(run)
+        tell(source, run)
+    return converted, failures
+
+
+def _other_form(source: RunSource) -> Form:
+    return "folder" if source.path.suffix.lower() == ".mcap" and source.path.is_file() else "mcap"
+
+
+def _convert(source: RunSource, out: Path, form: Form, options: ReadOptions, inputs: Collection[Path]) -> ConvertedRun:
+    target = _target(source, out, form)
+    if target.resolve() in inputs:
+        raise UsageError(f"--out {out}: {target} is one of the logs to convert; name another folder")
+    if is_message_file(source.path) or is_bag_folder(source.path):
+        tables = tables_of_messages(source, options)
+    else:
+        tables = tables_of_folder(source)
+    try:
+        write = _into_mcap if form == "mcap" else _into_folder
+        write(tables, source, out, target)
+    except OSError as error:
+        raise DataError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from error
+    return ConvertedRun(source.name, target, tables.notices)
+
+
+def _target(source: RunSource, out: Path, form: Form) -> Path:
+    vehicle_of(source)
+    if form == "folder":
+        return out / source.name
+    _, own = vehicle_place(source, out, out / source.name)
+    return out / source.name / f"{Path(source.name).name}.mcap" if own else out / f"{source.name}.mcap"
+
+
+def _into_mcap(tables: RunTables, source: RunSource, out: Path, target: Path) -> None:
+    vehicle, _ = vehicle_place(source, out, out / source.name)
+    if target.exists() and (not target.is_file() or library_of(target) != LIBRARY):
+        raise UsageError(f"{target}: is there and was not written by sccal convert; name another folder")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_mcap_of(tables, target)
+    _write_missing(vehicle, tables.vehicle_text)
+    _copy_reference(source.path, target)
+
+
+def _into_folder(tables: RunTables, source: RunSource, out: Path, target: Path) -> None:
+    earlier = _earlier_files(target)
+    vehicle, _ = vehicle_place(source, out, target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    staging = target.parent / f".{target.name}.{os.getpid()}.part"
+    shutil.rmtree(staging, ignore_errors=True)
+    staging.mkdir()
+    try:
+        write_folder_of(tables, staging)
+        _copy_reference(source.path, staging)
+        note = {
+            "schema": SCHEMA,
+            "sccal": __version__,
+            "run": source.name,
+            "source": str(source.path),
+            "files": sorted(path.name for path in staging.iterdir()),
+            "notices": [asdict(notice) for notice in tables.notices],
+        }
+        write_bytes(staging / NOTE_FILE, (json.dumps(note, indent=2, ensure_ascii=False) + "\n").encode())
+        _move_into_place(staging, target, earlier)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    _write_missing(vehicle, tables.vehicle_text)
+
+
+def _write_missing(path: Path, text: bytes) -> None:
+    if not path.exists() or path.read_bytes() != text:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(path, text)
+
+
+def _copy_reference(run: Path, target: Path) -> None:
+    """A degraded log's reference and manifest go along, so that what judges it is not lost."""
+    for name in (REFERENCE_FILE, MANIFEST_FILE):
+        there, here = beside(run, name), beside(target, name)
+        if there.is_file():
+            write_bytes(here, there.read_bytes())
+        else:
+            here.unlink(missing_ok=True)
+
+
+def _earlier_files(target: Path) -> list[str]:
+    """What an earlier call left in the folder. Raises UsageError where something else stands there."""
+    if not target.exists():
+        return []
+    if not target.is_dir():
+        raise UsageError(f"{target}: a file of that name is in the way")
+    note = target / NOTE_FILE
+    if not note.is_file():
+        if any(one.is_file() for one in target.iterdir()):
+            raise UsageError(f"{target}: holds files that sccal convert did not write; name another folder")
+        return []
+    try:
+        document = json.loads(note.read_text(encoding="utf-8"))
+        ours = document["schema"] == SCHEMA
+        names = [str(name) for name in document["files"]]
+    except (ValueError, KeyError, TypeError):
+        ours, names = False, []
+    if not ours:
+        raise UsageError(f"{note}: not a note of sccal convert; name another folder")
+    known = (*RUN_FILES, REFERENCE_FILE, MANIFEST_FILE)
+    return [NOTE_FILE, *(name for name in names if name in known)]
+
+
+def _move_into_place(staging: Path, target: Path, earlier: list[str]) -> None:
+    if not target.exists():
+        staging.rename(target)
+        return
+    for name in earlier:
+        (target / name).unlink(missing_ok=True)
+    for path in sorted(staging.iterdir(), key=lambda path: path.name == NOTE_FILE):
+        path.replace(target / path.name)
