@@ -179,7 +179,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         loose=wheels.loose,
         heading_t_s=heading.t_s[seen],
         yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], heading.convention or run.vehicle.convention)),
-        yaw_sigma_rad=None if heading.yaw_sigma_rad is None else heading.yaw_sigma_rad[seen],
+        yaw_sigma_rad=None if heading.yaw_sigma_rad is None else _without_gaps(heading.yaw_sigma_rad[seen]),
         pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
         roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
         fix_t_s=t_s[good_index],
@@ -266,6 +266,14 @@ def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStr
         wheels.loose[first:],
         {name: values[first:] for name, values in wheels.extras.items()},
     )
+
+
+def _without_gaps(sigma_rad: Floats) -> Floats | None:
+    """Sigmas (h,) with the usual one where none is stated; None where none is stated anywhere."""
+    stated = np.isfinite(sigma_rad)
+    if not stated.any():
+        return None
+    return sigma_rad if stated.all() else np.where(stated, sigma_rad, np.median(sigma_rad[stated]))
 
 
 def _inside(t_s: Floats, span: tuple[float, float], source: str, notices: list[Notice]) -> Bools:

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sccal.arrays import Floats
+from sccal.arrays import Bools, Floats
+from sccal.errors import DataError
+from sccal.logs.limits import ANGLE_LIMIT_RAD, SIGMA_LIMIT_RAD, TURN_LIMIT_RAD, TURN_RATE_LIMIT_RADPS
 from sccal.logs.streams import HeadingStream, Notice
-from sccal.logs.table import read_table
+from sccal.logs.table import Table, read_table
 
 _YAW = ("yaw_deg", "yaw_rad")
 _FURTHER = {
@@ -16,6 +18,12 @@ _FURTHER = {
     "roll": ("roll_deg", "roll_rad"),
     "yaw_sigma": ("yaw_sigma_deg", "yaw_sigma_rad"),
     "gyro_z": ("gyro_z_dps", "gyro_z_radps"),
+}
+_LIMITS = {
+    "pitch": TURN_LIMIT_RAD,
+    "roll": TURN_LIMIT_RAD,
+    "yaw_sigma": SIGMA_LIMIT_RAD,
+    "gyro_z": TURN_RATE_LIMIT_RADPS,
 }
 _DEGREE_LIKE_RAD = 50.0
 
@@ -27,6 +35,7 @@ def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
         DataError: unreadable file or missing columns.
     """
     table = read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad")))
+    table = _without_impossible_yaws(table, path)
     notices = list(table.notices)
     yaw_rad = _radians(table.columns, *_YAW)
     assert yaw_rad is not None
@@ -36,6 +45,12 @@ def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
             what = f"yaw_rad values beyond {_DEGREE_LIKE_RAD:.0f} look like degrees; if so, name the column yaw_deg"
             notices.append(Notice(table.source, what, int(odd.sum()), f"line {table.line[odd][0]}", "warning"))
     further = {name: _radians(table.columns, *pair) for name, pair in _FURTHER.items()}
+    for name, limit in _LIMITS.items():
+        angle = further[name]
+        if angle is not None and (beyond := np.abs(angle) > limit).any():
+            further[name] = np.where(beyond, np.nan, angle)
+            what = f"impossible values of {name} taken as empty"
+            notices.append(Notice(table.source, what, int(beyond.sum()), f"line {table.line[beyond][0]}", "warning"))
     sigma_rad = further["yaw_sigma"]
     if sigma_rad is not None:
         unusable = sigma_rad <= 0
@@ -54,6 +69,18 @@ def read_ahrs(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
         extras=table.extras(used),
     )
     return stream, tuple(notices)
+
+
+def _without_impossible_yaws(table: Table, path: Path) -> Table:
+    name = next(name for name in _YAW if name in table.columns)
+    beyond: Bools = np.abs(table.columns[name]) > ANGLE_LIMIT_RAD
+    if not beyond.any():
+        return table
+    what = f"rows with {name} beyond {ANGLE_LIMIT_RAD:g} dropped"
+    notice = Notice(table.source, what, int(beyond.sum()), f"line {table.line[beyond][0]}", "warning")
+    if beyond.all():
+        raise DataError(f"{path}: {notice}; no row is left")
+    return table.keep(~beyond, [notice])
 
 
 def _radians(columns: dict[str, Floats], in_degrees: str, in_radians: str) -> Floats | None:

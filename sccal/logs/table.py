@@ -60,7 +60,7 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     source = path.name
     data = _load(path)
     names, separator, header_line, body = _split_header(data, path)
-    required = _required(names, alternatives, path)
+    required = _required(names, alternatives, path, header_line)
     notices: list[Notice] = []
     body = _without_endless_lines(body, header_line, source, notices)
     body = _without_cut_line(body, separator, len(names), header_line, source, notices)
@@ -118,7 +118,7 @@ def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
             break
         start = end + 1
     else:
-        raise DataError(f"{path}: no header line; the first line names the columns, such as t,yaw_deg")
+        raise DataError(f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg")
     separator = next((mark for mark in ",;\t" if mark in text), ",")
     names = [name.strip().strip('"').strip() for name in text.split(separator)]
     if len(names) > _COLUMN_LIMIT:
@@ -126,14 +126,14 @@ def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
     return names, separator, line, data[end + 1 :]
 
 
-def _required(names: list[str], alternatives: Sequence[Sequence[str]], path: Path) -> Sequence[str]:
+def _required(names: list[str], alternatives: Sequence[Sequence[str]], path: Path, line: int) -> Sequence[str]:
     for alternative in alternatives:
         if set(alternative) <= set(names):
             return alternative
     needed = " or ".join(",".join(alternative) for alternative in alternatives)
     shown = ",".join(names[:20])
     there = "".join(mark if mark.isprintable() else "?" for mark in shown)[:200]
-    raise DataError(f"{path}: the header needs {needed}; it has {there}")
+    raise DataError(f"{path}: the header (line {line}) needs {needed}; it has {there}")
 
 
 def _without_endless_lines(body: bytes, header_line: int, source: str, notices: list[Notice]) -> bytes:
