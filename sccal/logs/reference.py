@@ -13,6 +13,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -52,7 +53,7 @@ def read_reference_rows(path: Path) -> ReferenceRows:
     """A reference file's rows. Raises DataError where the file is none."""
     try:
         table = _table(path.read_bytes())
-        numbers = {name: table[name].to_numpy(dtype=np.float64) for name in table.columns if name != "state"}
+        numbers = {name: _numbers(table[name]) for name in table.columns if name != "state"}
         _require_ranges(numbers)
         quality = numbers["quality"].astype(np.int64)
     except (OSError, ValueError) as error:
@@ -73,13 +74,15 @@ def read_reference_rows(path: Path) -> ReferenceRows:
 def _table(data: bytes) -> pd.DataFrame:
     """The columns below the header; raises ValueError where they are not those of a reference."""
     header = data[: data.find(b"\n", 0, _LONGEST_HEADER) + 1]
-    if [name.strip() for name in header.decode("utf-8", "replace").split(",")][: len(_COLUMNS)] != _COLUMNS:
+    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+    if names[: len(_COLUMNS)] != _COLUMNS or len(set(names)) != len(names):
         raise ValueError(f"line 1 must begin with {','.join(_COLUMNS)}; the file has {len(data)} bytes")
     width = header.count(b",")
     odd = next((i for i, row in enumerate(data.splitlines(), 1) if row.count(b",") != width), 0)
     if odd:
         raise ValueError(f"line {odd} has not {width + 1} cells")
     table = pd.read_csv(io.BytesIO(data), dtype={"state": str}, index_col=False, skip_blank_lines=False)
+    table.columns = pd.Index(names)
     wrong = ~table["state"].isin(STATES).to_numpy(dtype=np.bool_)
     if wrong.any():
         raise ValueError(f"line {_line(wrong)}: state is none of {', '.join(STATES)}")
@@ -97,6 +100,15 @@ def _require_ranges(numbers: Mapping[str, Floats]) -> None:
     ):
         if wrong.any():
             raise ValueError(f"line {_line(wrong)}: {what}")
+
+
+def _numbers(column: pd.Series[Any]) -> Floats:
+    """The cells as numbers, NaN where they are empty; raises ValueError with the line of any other."""
+    values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    wrong = np.isnan(values) & column.notna().to_numpy(dtype=np.bool_)
+    if wrong.any():
+        raise ValueError(f"line {_line(wrong)}: {column.name} is no number")
+    return values
 
 
 def _line(wrong: Bools) -> int:

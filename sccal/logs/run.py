@@ -101,8 +101,10 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     if not {"gnss.nmea", "gnss.csv"} & set(there):
         missing.append("gnss.nmea (or gnss.csv)")
     if missing:
+        odd = [name for name in RUN_FILES if name not in there and os.path.lexists(source.path / name)]
         raise DataError(
             f"{source.path}: lacks {', '.join(missing)}; found {', '.join(there) or 'none of the run files'}"
+            + (f"; not a regular file: {', '.join(odd)}" if odd else "")
         )
     vehicle, notices = read_vehicle(_vehicle_toml(source))
     wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)

@@ -77,7 +77,7 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
         notices.append(Notice(source, what, int(unreadable.sum()), f"line {line[unreadable][0]}"))
     rows_seen = int(content.sum())
     if not readable.any():
-        why = "; ".join(str(notice) for notice in notices) or "nothing below the header"
+        why = "; ".join(str(notice) for notice in notices) or f"nothing below the header (line {header_line})"
         raise DataError(
             f"{path}: no usable row of {rows_seen}, {', '.join(required)} must be numbers in every row: {why}"
         )

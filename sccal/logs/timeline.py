@@ -50,7 +50,7 @@ def _without_impossible(
     t_s: Floats, possible: Bools, line: Ints, source: str
 ) -> tuple[Ints, tuple[Notice, ...]]:
     first = int(np.flatnonzero(~possible)[0])
-    what = f"rows dropped whose times are no seconds (t = {t_s[first]:.6g}, beyond {TIME_LIMIT_S:g})"
+    what = f"rows with bad stamps dropped (t = {t_s[first]:.6g} s, beyond {TIME_LIMIT_S:g})"
     notice = Notice(source, what, int((~possible).sum()), f"line {line[first]}", "warning")
     rows = np.flatnonzero(possible)
     if rows.size < LEAST_SHARE * t_s.size:

@@ -29,6 +29,7 @@ _EXAMPLES = {
     ("ahrs", "convention"): 'convention = "enu"',
 }
 
+_LARGEST_BYTES = 1 << 20
 _RANGES = {"wheel_radius_m": WHEEL_RADIUS_M, "track_m": TRACK_M, "ticks_per_rev": TICKS_PER_REV}
 
 
@@ -64,6 +65,9 @@ def read_vehicle(path: Path) -> tuple[Vehicle, tuple[Notice, ...]]:
 
 def _load(path: Path) -> dict[str, Any]:
     try:
+        size = path.stat().st_size
+        if size > _LARGEST_BYTES:
+            raise DataError(f"{path}: {size} bytes are no vehicle.toml; it should hold {MINIMAL_VEHICLE}")
         text = path.read_bytes().decode("utf-8-sig")
         return tomllib.loads(text.replace("\r\n", "\n"))
     except OSError as error:
