@@ -16,9 +16,9 @@ _VALUES = (
     b"4294967295", b"65535", b"x", b'"1"', b"#", b"?", b"\xff", b"True", b"1,5", b"0x10", b"1_0", b"99999999999999999999",
     b"9060.0000", b"18000.1", b"0.00000000000000000001", b"99999999999999999999.9", b"246060.99", b"240000",
 )  # fmt: skip
-_WORDS = tuple(struct.pack("<Q", value) for value in (0, 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1, 10**18)) + tuple(
-    struct.pack("<d", value) for value in (float("nan"), float("inf"), -0.0, 1e300, 5e-324, 91.0, 1e9, -1e18)
-)
+_WORDS = tuple(
+    struct.pack("<Q", value) for value in (0, 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1, 10**18)
+) + tuple(struct.pack("<d", value) for value in (float("nan"), float("inf"), -0.0, 1e300, 5e-324, 91.0, 1e9, -1e18))
 
 
 def mutated_text(data: bytes, random: Random) -> bytes:

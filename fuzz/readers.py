@@ -35,7 +35,9 @@ from sccal.logs.vehicle import read_vehicle
 
 PLACE = re.compile(r"line \d|byte \d|message \d|\d+ bytes|row \d|\bt = |\[\w+\]")
 """A place in a file, in the words of the messages."""
-WHOLE_FILE = re.compile(r"lacks |cannot be read as a ROS|UTF-16|no message can be read|no topic|no joint|topics may be|share no time")
+WHOLE_FILE = re.compile(
+    r"lacks |cannot be read as a ROS|UTF-16|no message can be read|no topic|no joint|topics may be|share no time"
+)
 """Failures that concern a file as a whole."""
 TIME_LIMIT_S = 1e11
 HEIGHT_LIMIT_M = 1e6
@@ -47,7 +49,7 @@ class Broken(AssertionError):  # noqa: N818
     """A promise of the readers that was not kept."""
 
 
-class Stuck(BaseException):  # noqa: N818
+class Stuck(BaseException):
     """More processor time than an input of this size may take; no `except Exception` stops it."""
 
 
@@ -138,7 +140,15 @@ def check_aligned(aligned: Aligned) -> None:
     """Raise Broken where an aligned run could not be filtered."""
     for name in ("wheel_t_s", "heading_t_s", "fix_t_s"):
         _check_times(getattr(aligned, name), name)
-    for name in ("right_rad", "left_rad", "yaw_rad", "fix_east_m", "fix_north_m", "fix_var_east_m2", "fix_var_north_m2"):
+    for name in (
+        "right_rad",
+        "left_rad",
+        "yaw_rad",
+        "fix_east_m",
+        "fix_north_m",
+        "fix_var_east_m2",
+        "fix_var_north_m2",
+    ):
         _require(np.isfinite(getattr(aligned, name)).all(), f"aligned: {name} is not finite")
     _require((aligned.fix_var_east_m2 > 0).all() and (aligned.fix_var_north_m2 > 0).all(), "aligned: variances of zero")
     cov2 = aligned.fix_cov_m2**2

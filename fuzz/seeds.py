@@ -56,7 +56,9 @@ def run_files() -> dict[str, bytes]:
     fixes, _ = parse_nmea(files["gnss.nmea"], "gnss.nmea")
     rows = zip(fixes.host_t_s, fixes.lat_deg, fixes.lon_deg, fixes.alt_m, fixes.quality, strict=True)
     text = "t,lat_deg,lon_deg,alt_m,fix_quality,sigma_m\n"
-    files["gnss.csv"] = (text + "".join(f"{t:.4f},{lat:.9f},{lon:.9f},{alt:.3f},{q},0.02\n" for t, lat, lon, alt, q in rows)).encode()
+    files["gnss.csv"] = (
+        text + "".join(f"{t:.4f},{lat:.9f},{lon:.9f},{alt:.3f},{q},0.02\n" for t, lat, lon, alt, q in rows)
+    ).encode()
     text = "t,lat_deg,lon_deg,quality,state\n"
     rows = zip(fixes.host_t_s, fixes.lat_deg, fixes.lon_deg, fixes.quality, strict=True)
     states = ("same", "lost", "displaced")
@@ -102,9 +104,7 @@ def _mcap_seeds() -> list[bytes]:
     sentences = []
     for i, line in enumerate(run_files()["gnss.nmea"].splitlines()[:5]):
         values = {"header": message_logs.stamp(first * 1e-9), "sentence": line.partition(b" ")[2].decode()}
-        sentences.append(
-            ("/nmea", "nmea_msgs/msg/Sentence", first + i, message_logs.cdr("nmea_msgs/Sentence", values))
-        )
+        sentences.append(("/nmea", "nmea_msgs/msg/Sentence", first + i, message_logs.cdr("nmea_msgs/Sentence", values)))
     without_fixes = [message for message in messages if not message[1].endswith("NavSatFix")]
     return [
         message_logs.ros2_bytes(messages, **bare),
@@ -153,5 +153,3 @@ def seeds_of(reader: str) -> list[bytes]:
         "db3": lambda: [_db3_seed()],
         "bag": lambda: [_bag_seed()],
     }[reader]()
-
-

@@ -37,7 +37,9 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         DataError: ticks without ``ticks_per_rev``, or counts that no motion explains.
     """
     in_ticks = set(_TICKS) <= table.columns.keys()
-    table = _without_impossible(table, _TICKS if in_ticks else _ANGLES, path, TICKS_LIMIT if in_ticks else ANGLE_LIMIT_RAD)
+    table = _without_impossible(
+        table, _TICKS if in_ticks else _ANGLES, path, TICKS_LIMIT if in_ticks else ANGLE_LIMIT_RAD
+    )
     if in_ticks and vehicle.ticks_per_rev is None:
         raise DataError(
             f"{path}: left_ticks,right_ticks need ticks_per_rev in {vehicle.path}; "

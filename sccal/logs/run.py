@@ -49,7 +49,7 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     if not paths:
         raise UsageError("no path given; name a run's folder or a folder of runs")
     found: list[RunSource] = []
-    seen: set[Path] = set()
+    seen: set[str] = set()
     for path in paths:
         root = _root(path)
         places = [path] if _is_message_file(path) else _run_places(root)
@@ -62,8 +62,8 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
                 f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}, "
                 f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own"
             )
-        found += [source for source in sources if source.path.resolve() not in seen]
-        seen |= {source.path.resolve() for source in sources}
+        found += [source for source in sources if os.path.realpath(source.path) not in seen]
+        seen |= {os.path.realpath(source.path) for source in sources}
     return _with_unique_names(found)
 
 
@@ -94,6 +94,8 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     """
     if _is_message_file(source.path) or _is_bag_folder(source.path):
         return _read_message_run(source, options or ReadOptions())
+    if not source.path.is_dir():
+        raise DataError(f"{source.path}: is not a regular file, and is not opened; copy the log itself here")
     there = [name for name in RUN_FILES if (source.path / name).is_file()]
     missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
     if missing == ["ahrs.csv"] and "gnss.nmea" in there:

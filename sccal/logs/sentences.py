@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.logs.limits import TIME_LIMIT_S
 from sccal.logs.decimals import PAD, Bytes, Decimals, Words, parse_decimals, read_decimals, words_of
+from sccal.logs.limits import TIME_LIMIT_S
 
 Kinds = NDArray[np.uint8]
 

@@ -118,7 +118,9 @@ def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
             break
         start = end + 1
     else:
-        raise DataError(f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg")
+        raise DataError(
+            f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
+        )
     separator = next((mark for mark in ",;\t" if mark in text), ",")
     names = [name.strip().strip('"').strip() for name in text.split(separator)]
     if len(names) > _COLUMN_LIMIT:

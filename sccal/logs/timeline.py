@@ -46,9 +46,7 @@ def order_in_time(t_s: Floats, line: Ints, source: str) -> tuple[Ints, tuple[Not
     return order, tuple(notices)
 
 
-def _without_impossible(
-    t_s: Floats, possible: Bools, line: Ints, source: str
-) -> tuple[Ints, tuple[Notice, ...]]:
+def _without_impossible(t_s: Floats, possible: Bools, line: Ints, source: str) -> tuple[Ints, tuple[Notice, ...]]:
     first = int(np.flatnonzero(~possible)[0])
     what = f"rows with bad stamps dropped (t = {t_s[first]:.6g} s, beyond {TIME_LIMIT_S:g})"
     notice = Notice(source, what, int((~possible).sum()), f"line {line[first]}", "warning")
