@@ -43,6 +43,7 @@ def hunt(name: str, seconds: int, folder: Path) -> None:
     mutate = mutator_of(name, reader.text)
     scratch = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
     counts = {"runs": 0, "read": 0}
+    every = 1 if reader.limit_s > 30 else 100
 
     def one(data: bytes) -> None:
         counts["runs"] += 1
@@ -53,7 +54,7 @@ def hunt(name: str, seconds: int, folder: Path) -> None:
             if isinstance(error, KeyboardInterrupt):
                 raise
             keep(folder, signature(error), data, error)
-        if counts["runs"] % 100 == 0:
+        if counts["runs"] % every == 0:
             (folder / "counts.json").write_text(json.dumps(counts))
 
     def mutation(data: bytes, most: int, seed: int) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import struct
 from random import Random
@@ -13,8 +14,9 @@ _VALUES = (
     b"nan", b"inf", b"-inf", b"1e300", b"-1e300", b"1e-300", b"", b"-1", b"0", b"0.0", b"1", b"90", b"91", b"-90.0001",
     b"180", b"360", b"361", b"1e9", b"1e17", b"9007199254740993", b"9223372036854775807", b"9223372036854775808",
     b"-9223372036854775808", b"-9223372036854775809", b"18446744073709551615", b"18446744073709551616", b"1e19",
-    b"4294967295", b"65535", b"x", b'"1"', b"#", b"?", b"\xff", b"True", b"1,5", b"0x10", b"1_0", b"99999999999999999999",
-    b"9060.0000", b"18000.1", b"0.00000000000000000001", b"99999999999999999999.9", b"246060.99", b"240000",
+    b"4294967295", b"65535", b"x", b'"1"', b"#", b"?", b"\xff", b"True", b"1,5", b"0x10", b"1_0",
+    b"99999999999999999999", b"9060.0000", b"18000.1",
+    b"0.00000000000000000001", b"99999999999999999999.9", b"246060.99", b"240000",
 )  # fmt: skip
 _WORDS = tuple(
     struct.pack("<Q", value) for value in (0, 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1, 10**18)
@@ -95,10 +97,8 @@ def _column(lines: list[bytes], random: Random) -> None:
         fields = lines[i].split(b",")
         if j < len(fields):
             if random.random() < 0.5:
-                try:
+                with contextlib.suppress(ValueError):
                     value = b"%r" % (float(fields[j]) * scale)
-                except ValueError:
-                    pass
             fields[j] = value
             lines[i] = b",".join(fields)
 

@@ -76,7 +76,11 @@ def _check_out(out: Path, sources: Sequence[RunSource]) -> None:
     """Logs are never written among the logs that they come from."""
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out {out}: a file of that name is in the way")
-    real = [folder.resolve() for source in sources for folder in (source.path, source.searched_up_to or source.path)]
+    real = [
+        Path(os.path.realpath(folder))
+        for source in sources
+        for folder in (source.path, source.searched_up_to or source.path)
+    ]
     places = [(out, out.resolve()), *((out / source.name, (out / source.name).resolve()) for source in sources)]
     for place, there in places:
         for folder in real:

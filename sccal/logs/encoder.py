@@ -37,15 +37,13 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         DataError: ticks without ``ticks_per_rev``, or counts that no motion explains.
     """
     in_ticks = set(_TICKS) <= table.columns.keys()
-    table = _without_impossible(
-        table, _TICKS if in_ticks else _ANGLES, path, TICKS_LIMIT if in_ticks else ANGLE_LIMIT_RAD
-    )
+    names, limit = (_TICKS, TICKS_LIMIT) if in_ticks else (_ANGLES, ANGLE_LIMIT_RAD)
+    table = _without_impossible(table, names, path, limit)
     if in_ticks and vehicle.ticks_per_rev is None:
         raise DataError(
             f"{path}: left_ticks,right_ticks need ticks_per_rev in {vehicle.path}; "
             "add a line such as ticks_per_rev = 32768 below [encoder], or log left_rad,right_rad"
         )
-    names = _TICKS if in_ticks else _ANGLES
     counts_per_turn = vehicle.ticks_per_rev if in_ticks and vehicle.ticks_per_rev else 2 * np.pi
     counts_per_m = counts_per_turn / (2 * np.pi * vehicle.wheel_radius_m)
     scale = Scale(counts_per_m, 1.0 if in_ticks else _ANGLE_QUANTUM_RAD)
@@ -91,7 +89,7 @@ def _width(
     t_s: Floats, counts: Floats, line: Ints, scale: Scale, vehicle: Vehicle, source: str, notices: list[Notice]
 ) -> int | None:
     """The width to unwrap at: as declared where the values agree with it, else as detected."""
-    beyond = (np.abs(counts) > _EXACT_LIMIT).any(axis=1)
+    beyond = (np.abs(counts) >= _EXACT_LIMIT).any(axis=1)
     if beyond.any():
         what = "rows with counts beyond 2^53, which are read to some ticks only"
         notices.append(Notice(source, what, int(beyond.sum()), f"line {line[beyond][0]}", "warning"))

@@ -24,6 +24,7 @@ from sccal.logs.timeline import order_in_time
 
 _LINE_LIMIT_BYTES = 64 * 1024
 _COLUMN_LIMIT = 1000
+_LONG_NUMBER = 64
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,10 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
         notices.append(Notice(source, what, int(unreadable.sum()), f"line {line[unreadable][0]}"))
     rows_seen = int(content.sum())
     if not readable.any():
-        why = "; ".join(str(notice) for notice in notices) or f"nothing below the header (line {header_line})"
+        why = "; ".join(str(notice) for notice in notices) or "nothing below the header"
         raise DataError(
-            f"{path}: no usable row of {rows_seen}, {', '.join(required)} must be numbers in every row: {why}"
+            f"{path}: no usable row of {rows_seen} below line {header_line}, "
+            f"{', '.join(required)} must be numbers in every row: {why}"
         )
     columns = {name: column[readable] for name, column in columns.items()}
     line = line[readable]
@@ -190,7 +192,10 @@ def _parse(
         raise DataError(f"{path}: cannot be read as CSV ({' '.join(str(error).split())})") from error
     for position in range(len(names), width):
         if frame[position].notna().any():
-            raise DataError(f"{path}: the header names {len(names)} columns but the rows have {width}; name them all")
+            raise DataError(
+                f"{path}: the header (line {header_line}) names {len(names)} columns, "
+                f"but the rows have {width}; name them all"
+            )
     return frame
 
 
@@ -291,4 +296,12 @@ def _floats(series: pd.Series[Any]) -> Floats:
 
 
 def _unquoted(cell: object) -> object:
-    return cell.strip().strip('"').strip() if isinstance(cell, str) else cell
+    if not isinstance(cell, str):
+        return cell
+    text = cell.strip().strip('"').strip()
+    if len(text) < _LONG_NUMBER:
+        return text
+    try:  # pandas fails at whole numbers beyond the range of a float
+        return float(text)
+    except ValueError:
+        return math.nan
