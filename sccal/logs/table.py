@@ -296,12 +296,22 @@ def _floats(series: pd.Series[Any]) -> Floats:
 
 
 def _unquoted(cell: object) -> object:
+    """A cell for pandas, which fails at whole numbers beyond the range of a float."""
+    if isinstance(cell, int):
+        return cell if abs(cell) < 1 << 64 else _beyond(cell)
     if not isinstance(cell, str):
         return cell
     text = cell.strip().strip('"').strip()
     if len(text) < _LONG_NUMBER:
         return text
-    try:  # pandas fails at whole numbers beyond the range of a float
+    try:
         return float(text)
     except ValueError:
         return math.nan
+
+
+def _beyond(number: int) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
