@@ -18,12 +18,14 @@ from hypothesis import strategies as st
 
 from fuzz.readers import READERS, check_fixes, check_heading, check_wheels, feed
 from fuzz.seeds import run_files, with_checksum
+from sccal.align import align
 from sccal.cli import main
 from sccal.errors import DataError, SccalError, one_line
 from sccal.logs.ahrs import read_ahrs
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
 from sccal.logs.nmea import read_nmea
+from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Notice, Vehicle
 from sccal.logs.vehicle import read_vehicle
 
@@ -340,6 +342,25 @@ def test_what_is_no_log_ends_in_one_line(tmp_path, name, what):
     assert err.startswith("sccal: ")
     assert len(err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("sparse", ["encoder.csv", "gnss.csv"])
+def test_few_rows_over_many_days_take_no_grid_over_all_of_them(tmp_path, sparse):
+    (tmp_path / "vehicle.toml").write_bytes(run_files()["vehicle.toml"])
+    for name, cells in (
+        ("encoder.csv", "left_ticks,right_ticks"),
+        ("ahrs.csv", "yaw_deg"),
+        ("gnss.csv", "lat_deg,lon_deg"),
+    ):
+        step_s = 80_000.0 if name == sparse else 0.1
+        values = [
+            f"{47 + 1e-6 * i:.6f},8" if name == "gnss.csv" else f"{i}" + ",1" * ("," in cells) for i in range(400)
+        ]
+        rows = (f"{step_s * i:.1f},{value}\n" for i, value in enumerate(values))
+        (tmp_path / name).write_text(f"t,{cells}\n" + "".join(rows))
+    (source,) = discover([tmp_path])
+    with pytest.raises(DataError, match="one in"):
+        align(read_run(source))
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is closed to root")
