@@ -274,7 +274,7 @@ def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStr
 
 
 def _require_dense(t_s: Floats, source: str, most_pause_s: float) -> None:
-    """Raise DataError where few rows are spread over more days than any drive lasts: grids over time would be endless."""
+    """Raise DataError where few rows are spread over many days: grids over time would be endless."""
     span_s = float(np.ptp(t_s)) if t_s.size else 0.0
     if span_s > max(LONG_RUN_S, most_pause_s * t_s.size):
         raise DataError(
