@@ -3,9 +3,10 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 OUT    ?= out
+FUZZ_SECONDS ?= 60
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint bench samples clean
+.PHONY: help run test lint bench fuzz samples clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -23,6 +24,10 @@ lint: $(VENV)/.ready-dev ## ruff (style and format) and mypy
 
 bench: $(VENV)/.ready-dev ## time the filter, the readers and the whole command
 	$(BIN)/python -m benchmarks
+
+fuzz: $(VENV)/.ready-dev ## feed broken logs to every reader for FUZZ_SECONDS (60)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "atheris>=3"
+	$(BIN)/python -m fuzz --seconds $(FUZZ_SECONDS)
 
 samples: $(VENV)/.ready ## make sample_logs/ anew (seeded: the same bytes every time)
 	$(BIN)/sccal simulate --samples sample_logs

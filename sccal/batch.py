@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -201,5 +202,5 @@ def _check_out(out: Path, sources: Sequence[RunSource]) -> None:
     if out.exists() and not out.is_dir():
         raise UsageError(f"--out {out}: a file of that name is in the way")
     for source in sources:
-        if (out / source.name).resolve() == source.path.resolve():
+        if os.path.realpath(out / source.name) == os.path.realpath(source.path):
             raise UsageError(f"--out {out}: results would be written into the run's own folder {source.path}")

@@ -21,10 +21,23 @@ class Exit(IntEnum):
     NOTHING_MATCHED = 5
 
 
+_LONGEST_MESSAGE = 3000
+
+
+def one_line(text: str) -> str:
+    """The text without line ends and other characters that a terminal would obey; what is endless is cut."""
+    if not text.isprintable():
+        text = "".join(mark if mark.isprintable() else " " if mark.isspace() else "?" for mark in text)
+    return text if len(text) <= _LONGEST_MESSAGE else text[: _LONGEST_MESSAGE - 2] + " …"
+
+
 class SccalError(Exception):
     """A failure that the user can act on. The message is one line: what, where, the numbers, what to do."""
 
     exit_code: Exit = Exit.INTERNAL
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class UsageError(SccalError):

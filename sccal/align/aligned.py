@@ -29,6 +29,9 @@ from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, 
 from sccal.logs.windows import Window, windows_on_clock, within
 
 MIN_MEASUREMENTS = 10
+LONG_RUN_S = 2 * 86400.0
+MOST_PAUSE_S = 5.0
+"""Of the wheels' rows on average, in runs longer than LONG_RUN_S."""
 WHEEL_RATE_HZ = 20.0
 """As fine as the path need be for comparing clocks."""
 
@@ -117,6 +120,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     notices = list(run.notices)
     wheels, heading, fixes = run.wheels, run.heading, run.fixes
     whole = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
+    _require_dense(wheels.t_s, "encoder", MOST_PAUSE_S)
     if heading.utc_s is not None:
         fix_t_s, known, _, _ = on_host_clock(fixes, run.reference, whole)
         heading = _on_the_fixes_clock(heading, heading.utc_s, fixes.utc_s[known], fix_t_s[known])
@@ -127,6 +131,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     t_s, timed, clock, before_t_s = on_host_clock(fixes, run.reference, span, notices)
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
+    _require_dense(t_s[timed], "gnss", 12 * MOST_PAUSE_S)
     moved = _clocks_by_motion(run, heading, wheels, t_s, timed)
     if moved is not None:
         notices += moved.notices
@@ -180,7 +185,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         loose=wheels.loose,
         heading_t_s=heading.t_s[seen],
         yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], heading.convention or run.vehicle.convention)),
-        yaw_sigma_rad=None if heading.yaw_sigma_rad is None else heading.yaw_sigma_rad[seen],
+        yaw_sigma_rad=None if heading.yaw_sigma_rad is None else _without_gaps(heading.yaw_sigma_rad[seen]),
         pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
         roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
         fix_t_s=t_s[good_index],
@@ -276,6 +281,24 @@ def _from_first_heading(wheels: WheelStream, heading: HeadingStream) -> WheelStr
         wheels.loose[first:],
         {name: values[first:] for name, values in wheels.extras.items()},
     )
+
+
+def _require_dense(t_s: Floats, source: str, most_pause_s: float) -> None:
+    """Raise DataError where few rows are spread over many days: grids over time would be endless."""
+    span_s = float(np.ptp(t_s)) if t_s.size else 0.0
+    if span_s > max(LONG_RUN_S, most_pause_s * t_s.size):
+        raise DataError(
+            f"{source}: {t_s.size} rows from t = {t_s.min():.3f} to {t_s.max():.3f} s, which is one in "
+            f"{span_s / t_s.size:.0f} s: t must be seconds, and a run one drive"
+        )
+
+
+def _without_gaps(sigma_rad: Floats) -> Floats | None:
+    """Sigmas (h,) with the usual one where none is stated; None where none is stated anywhere."""
+    stated = np.isfinite(sigma_rad)
+    if not stated.any():
+        return None
+    return sigma_rad if stated.all() else np.where(stated, sigma_rad, np.median(sigma_rad[stated]))
 
 
 def _inside(t_s: Floats, span: tuple[float, float], source: str, notices: list[Notice]) -> Bools:

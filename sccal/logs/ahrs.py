@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sccal.arrays import Floats
+from sccal.arrays import Bools, Floats
+from sccal.errors import DataError
+from sccal.logs.limits import ANGLE_LIMIT_RAD, SIGMA_LIMIT_RAD, TURN_LIMIT_RAD, TURN_RATE_LIMIT_RADPS
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.table import Table, read_table
 
@@ -19,6 +21,12 @@ _FURTHER = {
 }
 AHRS_COLUMNS = ("t", *_YAW, *(name for pair in _FURTHER.values() for name in pair))
 """The columns with a meaning; all others are further ones."""
+_LIMITS = {
+    "pitch": TURN_LIMIT_RAD,
+    "roll": TURN_LIMIT_RAD,
+    "yaw_sigma": SIGMA_LIMIT_RAD,
+    "gyro_z": TURN_RATE_LIMIT_RADPS,
+}
 _DEGREE_LIKE_RAD = 50.0
 
 
@@ -37,7 +45,7 @@ def ahrs_table(path: Path) -> Table:
     Raises:
         DataError: unreadable file or missing columns.
     """
-    return read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad")))
+    return _without_impossible_yaws(read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad"))), path)
 
 
 def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:
@@ -51,6 +59,12 @@ def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:
             what = f"yaw_rad values beyond {_DEGREE_LIKE_RAD:.0f} look like degrees; if so, name the column yaw_deg"
             notices.append(Notice(table.source, what, int(odd.sum()), f"line {table.line[odd][0]}", "warning"))
     further = {name: _radians(table.columns, *pair) for name, pair in _FURTHER.items()}
+    for name, limit in _LIMITS.items():
+        angle = further[name]
+        if angle is not None and (beyond := np.abs(angle) > limit).any():
+            further[name] = np.where(beyond, np.nan, angle)
+            what = f"impossible values of {name} taken as empty"
+            notices.append(Notice(table.source, what, int(beyond.sum()), f"line {table.line[beyond][0]}", "warning"))
     sigma_rad = further["yaw_sigma"]
     if sigma_rad is not None:
         unusable = sigma_rad <= 0
@@ -68,6 +82,18 @@ def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:
         extras=table.extras(AHRS_COLUMNS),
     )
     return stream, tuple(notices)
+
+
+def _without_impossible_yaws(table: Table, path: Path) -> Table:
+    name = next(name for name in _YAW if name in table.columns)
+    beyond: Bools = np.abs(table.columns[name]) > ANGLE_LIMIT_RAD
+    if not beyond.any():
+        return table
+    what = f"rows with {name} beyond {ANGLE_LIMIT_RAD:g} dropped"
+    notice = Notice(table.source, what, int(beyond.sum()), f"line {table.line[beyond][0]}", "warning")
+    if beyond.all():
+        raise DataError(f"{path}: {notice}; no row is left")
+    return table.keep(~beyond, [notice])
 
 
 def _radians(columns: dict[str, Floats], in_degrees: str, in_radians: str) -> Floats | None:

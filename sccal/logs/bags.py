@@ -29,6 +29,10 @@ def read_bag(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
         raise DataError(f"{path}: reading ROS bags needs the extra `ros`: pip install 'sccal-robotics[ros]'") from error
     if path.is_file() and path.stat().st_size == 0:
         raise DataError(f"{path}: is empty (0 bytes); log it again or remove it")
+    if path.is_dir():
+        odd = [file.name for file in path.iterdir() if not file.is_file() and not file.is_dir()]
+        if odd:
+            raise DataError(f"{path}: {', '.join(sorted(odd)[:5])}: not a regular file, and not opened")
     ros1 = path.suffix.lower() == ".bag"
     reader: Callable[[Path], Any] = Ros1Reader if ros1 else Ros2Reader
     lost: list[Notice] = []

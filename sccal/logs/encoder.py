@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from sccal.arrays import Bools, Floats
+from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.counter import SPEED_LIMIT_MPS, Repair, Scale, detect_width, repair
+from sccal.logs.limits import ANGLE_LIMIT_RAD, TICKS_LIMIT
 from sccal.logs.streams import Notice, Vehicle, WheelStream
 from sccal.logs.table import Table, read_table
 
@@ -47,19 +48,20 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         DataError: ticks without ``ticks_per_rev``, or counts that no motion explains.
     """
     in_ticks = set(_TICKS) <= table.columns.keys()
+    names, limit = (_TICKS, TICKS_LIMIT) if in_ticks else (_ANGLES, ANGLE_LIMIT_RAD)
+    table = _without_impossible(table, names, path, limit)
     if in_ticks and vehicle.ticks_per_rev is None:
         raise DataError(
             f"{path}: left_ticks,right_ticks need ticks_per_rev in {vehicle.path}; "
             "add a line such as ticks_per_rev = 32768 below [encoder], or log left_rad,right_rad"
         )
-    names = _TICKS if in_ticks else _ANGLES
     counts_per_turn = vehicle.ticks_per_rev if in_ticks and vehicle.ticks_per_rev else 2 * np.pi
     counts_per_m = counts_per_turn / (2 * np.pi * vehicle.wheel_radius_m)
     scale = Scale(counts_per_m, 1.0 if in_ticks else _ANGLE_QUANTUM_RAD)
     t_s = table.columns["t"]
     counts = np.column_stack((table.columns[names[1]], table.columns[names[2]]))
     notices = list(table.notices)
-    bits = _width(t_s, counts, scale, vehicle, table.source, notices) if in_ticks else None
+    bits = _width(t_s, counts, table.line, scale, vehicle, table.source, notices) if in_ticks else None
     try:
         repaired = repair(t_s, counts, scale, bits)
     except ValueError as error:
@@ -84,21 +86,34 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
     return stream, tuple(notices)
 
 
+def _without_impossible(table: Table, names: tuple[str, ...], path: str, limit: float) -> Table:
+    """The table without rows whose counts no counter can hold."""
+    beyond: Bools = np.maximum(*(np.abs(table.columns[name]) for name in names[1:])) > limit
+    if not beyond.any():
+        return table
+    where = f"line {table.line[beyond][0]}"
+    what = f"rows with {' or '.join(names[1:])} beyond {limit:.4g} dropped"
+    notice = Notice(table.source, what, int(beyond.sum()), where, "warning")
+    if beyond.all():
+        raise DataError(f"{path}: {notice}; no row is left")
+    return table.keep(~beyond, [notice])
+
+
 def _width(
-    t_s: Floats, counts: Floats, scale: Scale, vehicle: Vehicle, source: str, notices: list[Notice]
+    t_s: Floats, counts: Floats, line: Ints, scale: Scale, vehicle: Vehicle, source: str, notices: list[Notice]
 ) -> int | None:
     """The width to unwrap at: as declared where the values agree with it, else as detected."""
-    beyond = int((np.abs(counts) > _EXACT_LIMIT).any(axis=1).sum())
-    if beyond:
+    beyond = (np.abs(counts) >= _EXACT_LIMIT).any(axis=1)
+    if beyond.any():
         what = "rows with counts beyond 2^53, which are read to some ticks only"
-        notices.append(Notice(source, what, beyond, severity="warning"))
+        notices.append(Notice(source, what, int(beyond.sum()), f"line {line[beyond][0]}", "warning"))
     bits = vehicle.counter_bits
     if bits is not None:
         outside = ((counts < -(2.0 ** (bits - 1))) | (counts >= 2.0**bits)).any(axis=1)
         if outside.mean() <= 0.01:
             return bits
         what = f"rows with counts beyond {bits} bits: counter_bits = {bits} not used; correct it in {vehicle.path.name}"
-        notices.append(Notice(source, what, int(outside.sum()), severity="warning"))
+        notices.append(Notice(source, what, int(outside.sum()), f"line {line[outside][0]}", "warning"))
     return detect_width(t_s, counts, scale)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
+from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.table import Table, read_table
 
@@ -67,16 +68,23 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
     given = table.columns.get("fix_quality", absent)
     codes = np.where(np.isfinite(given) & (given >= 0) & (given <= 9), given, -1)
     sigma_m = table.columns.get("sigma_m", absent)
-    sigma_m = np.where(sigma_m > 0, sigma_m, np.nan)
+    sigma_m = np.where(sigma_m > 0, np.minimum(sigma_m, SIGMA_LIMIT_M), np.nan)
     sigma_east_m, sigma_north_m = (_positive(table, f"sigma_{axis}_m", sigma_m) for axis in ("east", "north"))
     lon = table.columns["lon_deg"]
+    alt_m = table.columns.get("alt_m", absent)
+    high: Bools = np.abs(alt_m) > HEIGHT_LIMIT_M
+    if high.any():
+        alt_m = np.where(high, np.nan, alt_m)
+        what = f"heights beyond {HEIGHT_LIMIT_M:g} m taken as empty"
+        notice = Notice(table.source, what, int(high.sum()), f"line {table.line[high][0]}", "warning")
+        table = table.keep(np.ones(n, dtype=np.bool_), [notice])
     stream = FixStream(
         host_t_s=table.columns["t"],
         utc_s=absent,
         utc_has_date=False,
         lat_deg=table.columns["lat_deg"],
         lon_deg=np.where(np.abs(lon) > 180, (lon + 180) % 360 - 180, lon),
-        alt_m=table.columns.get("alt_m", absent),
+        alt_m=alt_m,
         quality=np.round(codes).astype(np.int64),
         sigma_east_m=sigma_east_m,
         sigma_north_m=sigma_north_m,
@@ -88,4 +96,4 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
 
 def _positive(table: Table, name: str, instead: Floats) -> Floats:
     given = table.columns.get(name, instead)
-    return np.where(given > 0, given, instead)
+    return np.where(given > 0, np.minimum(given, SIGMA_LIMIT_M), instead)

@@ -11,6 +11,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.mcap_topics import STAMPED, Messages
 from sccal.logs.mcap_wheels import of_messages
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
@@ -67,17 +68,24 @@ def fixes_of_positions(messages: Messages, path: str, source: str) -> tuple[FixS
     var_east, var_north = messages.column("cov_ee"), messages.column("cov_nn")
     stated = (var_east > 0) & (var_north > 0) & (messages.column("cov_type") != 0)
     sigma_east, sigma_north = (np.sqrt(np.where(stated, v, np.nan)) for v in (var_east, var_north))
+    sigma_east, sigma_north = np.minimum(sigma_east, SIGMA_LIMIT_M), np.minimum(sigma_north, SIGMA_LIMIT_M)
+    limit = sigma_east * sigma_north
+    alt_m = messages.column("altitude")
+    high = np.abs(alt_m) > HEIGHT_LIMIT_M
+    if high.any():
+        what = f"heights beyond {HEIGHT_LIMIT_M:g} m taken as empty"
+        notices.append(Notice(source, what, int(high.sum()), f"message {messages.number[high][0]}", "warning"))
     stream = FixStream(
         host_t_s=messages.t_s,
         utc_s=np.full(n, np.nan),
         utc_has_date=False,
         lat_deg=messages.column("latitude"),
         lon_deg=_wrapped_longitude(messages.column("longitude")),
-        alt_m=messages.column("altitude"),
+        alt_m=np.where(high | np.isinf(alt_m), np.nan, alt_m),
         quality=quality_of(messages.column("status"), np.maximum(sigma_east, sigma_north)),
         sigma_east_m=sigma_east,
         sigma_north_m=sigma_north,
-        cov_en_m2=np.where(stated, np.nan_to_num(messages.column("cov_en")), 0.0),
+        cov_en_m2=np.where(stated, np.clip(np.nan_to_num(messages.column("cov_en")), -limit, limit), 0.0),
     )
     return stream, of_messages((*notices, *order_notices))
 

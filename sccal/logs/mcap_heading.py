@@ -12,6 +12,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
+from sccal.logs.limits import ANGLE_LIMIT_RAD, SIGMA_LIMIT_RAD, TURN_RATE_LIMIT_RADPS
 from sccal.logs.mcap_topics import Messages
 from sccal.logs.mcap_wheels import of_messages
 from sccal.logs.streams import Convention, HeadingStream, Notice, Vehicle
@@ -63,8 +64,9 @@ def heading_of_quaternions(
     messages = messages.take(order)
     yaw, pitch, roll = euler(*(messages.column(axis) for axis in "xyzw"))
     variance = messages.column("cov_yaw")
-    sigma = np.sqrt(np.where(variance > 0, variance, np.nan))
+    sigma = np.minimum(np.sqrt(np.where(variance > 0, variance, np.nan)), SIGMA_LIMIT_RAD)
     gyro = np.where(messages.column("gyro_cov_first") == -1, np.nan, messages.column("gyro_z"))
+    gyro = np.where(np.abs(gyro) <= TURN_RATE_LIMIT_RADPS, gyro, np.nan)
     stream = HeadingStream(
         t_s=messages.t_s,
         yaw_rad=in_convention(yaw, written, vehicle.convention),
@@ -117,7 +119,7 @@ def heading_of_path(
 ) -> tuple[HeadingStream, tuple[Notice, ...]]:
     """Heading of one column, in the vehicle's convention; degrees where the topic or path ends in ``deg``."""
     values = messages.column(name)
-    has = np.isfinite(values)
+    has = np.abs(values) <= ANGLE_LIMIT_RAD
     notices = list(_missing(has, messages, "messages without a yaw passed over", source))
     messages = messages.keep(has)
     order, order_notices = order_in_time(messages.t_s, messages.number, source)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from sccal.arrays import Ints
-from sccal.logs.mcap_layout import MOST_FIELDS, Bytes, Part, Picker
+from sccal.logs.mcap_layout import MOST_COLUMNS, MOST_FIELDS, Bytes, Part, Picker
 
 _Way = tuple[str | int, ...]
 _DEEPEST = 24
@@ -46,6 +46,7 @@ class JsonGatherer:
     def __post_init__(self) -> None:
         self._plans: dict[tuple[str, ...], list[_Plan]] = {}
         self._plan_count = 0
+        self._names: set[str] = set()
 
     def take(self, data: Bytes, begin: Ints, end: Ints, first: int) -> None:
         """Read the messages at [begin, end) of ``data``, numbered from ``first`` on."""
@@ -84,6 +85,9 @@ class JsonGatherer:
         texts: dict[str, tuple[_Way, str]] = {}
         _flatten(message, "", (), numbers, texts)
         picked = self.picker(numbers, {path: text for path, (_, text) in texts.items()})
+        if len(self._names | picked.columns.keys()) > MOST_COLUMNS:
+            raise ValueError(f"its messages name more than {MOST_COLUMNS} different fields")
+        self._names |= picked.columns.keys()
         return _Plan(
             columns=tuple((name, numbers[path]) for name, path in picked.columns.items()),
             pinned=tuple(texts[path] for path in picked.pinned),

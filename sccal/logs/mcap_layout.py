@@ -21,6 +21,8 @@ Bytes = NDArray[np.uint8]
 
 MOST_FIELDS = 4096
 """Fields of a message beyond these are not noted."""
+MOST_COLUMNS = 256
+"""Columns of one topic: joints that change their names with every message would take memory for each."""
 _LAYOUTS_KEPT = 64
 _CONTINUES = np.uint8(0x80)
 
@@ -118,6 +120,7 @@ class Gatherer:
     walks: int = 0
     """Layouts met, or met again after too many others."""
     _layouts: dict[int, list[_Layout]] = field(default_factory=dict)
+    _names: set[str] = field(default_factory=set)
 
     def take(self, data: Bytes, begin: Ints, end: Ints, first: int) -> None:
         """Read the messages at [begin, end) of ``data``, numbered from ``first`` on."""
@@ -159,6 +162,9 @@ class Gatherer:
             for path, place in shape.texts.items()
         }
         picked = self.picker(shape.numbers, texts)
+        if len(self._names | picked.columns.keys()) > MOST_COLUMNS:
+            raise MalformedError(f"its messages name more than {MOST_COLUMNS} different fields")
+        self._names |= picked.columns.keys()
         fixed = shape.fixed + [
             (place.offset, place.offset + place.width) for place in map(shape.texts.__getitem__, picked.pinned)
         ]

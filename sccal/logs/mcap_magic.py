@@ -26,7 +26,7 @@ def require_mcap(path: Path) -> None:
         raise DataError(f"{path}: is empty (0 bytes); log it again or remove it")
     if begin != MAGIC:
         raise DataError(
-            f"{path}: not an MCAP file: it begins with {begin.hex(' ')}, not with {MAGIC.hex(' ')}; "
+            f"{path}: not an MCAP file: at byte 0 stands {begin.hex(' ')}, not {MAGIC.hex(' ')}; "
             "it was never written to, or is something else"
         )
 

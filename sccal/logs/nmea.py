@@ -66,7 +66,7 @@ def parse_nmea(raw: bytes, source: str, path: Path | str | None = None) -> tuple
     fixes = read_fixes(dated, source, notices)
     if fixes is None:
         why = "; ".join(str(notice) for notice in notices) or "no GGA, GNS, PTNL,GGK, KSXT or RMC with a time"
-        raise DataError(f"{where}: no position fix in {count} sentences: {why}")
+        raise DataError(f"{where}: no position fix in {count} sentences ({len(raw)} bytes): {why}")
     return fixes, tuple(notices)
 
 
@@ -86,7 +86,7 @@ def parse_nmea_heading(
     heading = read_heading(dated, source, notices)
     if heading is None:
         why = "; ".join(str(notice) for notice in notices) or f"no {HEADING_NAMES}"
-        raise DataError(f"{where}: no heading in {count} sentences: {why}")
+        raise DataError(f"{where}: no heading in {count} sentences ({len(raw)} bytes): {why}")
     return heading, tuple(notices)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M, SPEED_LIMIT_MPS
 from sccal.logs.nmea_positions import altitude, best_kind, extras
 from sccal.logs.nmea_receivers import one_receiver
 from sccal.logs.nmea_times import Dated, epoch_key, epochs_of_untimed
@@ -41,7 +42,7 @@ def read_fixes(dated: Dated, source: str, notices: list[Notice]) -> FixStream | 
         utc_has_date=dated.has_date,
         lat_deg=positions.lat_deg,
         lon_deg=positions.lon_deg,
-        alt_m=altitude(fixes, positions.kind),
+        alt_m=_possible_heights(altitude(fixes, positions.kind), fixes, source, notices),
         quality=positions.quality,
         sigma_east_m=sigma_east_m,
         sigma_north_m=sigma_north_m,
@@ -49,6 +50,15 @@ def read_fixes(dated: Dated, source: str, notices: list[Notice]) -> FixStream | 
         extras=extras(fixes, positions.kind),
         speed_mps=_speeds(dated, running_s),
     )
+
+
+def _possible_heights(alt_m: Floats, fixes: Sentences, source: str, notices: list[Notice]) -> Floats:
+    high = np.abs(alt_m) > HEIGHT_LIMIT_M
+    if not high.any():
+        return alt_m
+    what = f"heights beyond {HEIGHT_LIMIT_M:g} m taken as empty"
+    notices.append(Notice(source, what, int(high.sum()), f"line {fixes.line[high][0]}", "warning"))
+    return np.where(high, np.nan, alt_m)
 
 
 def _speeds(dated: Dated, running_s: Floats) -> Floats | None:
@@ -69,7 +79,7 @@ def _speeds(dated: Dated, running_s: Floats) -> Floats | None:
             knots, kmph = own.number(5), own.number(7)
             value = np.where(np.isfinite(kmph), kmph / 3.6, knots * _KNOT_MPS)
             value = np.where(own.letter(9) == ord("N"), np.nan, value)
-        usable = np.flatnonzero(np.isfinite(value) & (value >= 0))
+        usable = np.flatnonzero((value >= 0) & (value <= SPEED_LIMIT_MPS))
         if usable.size == 0:
             continue
         rows, value = rows[usable], value[usable]
@@ -118,6 +128,9 @@ def _stated_sigmas(dated: Dated, fix_running_s: Floats, talker: int) -> tuple[Fl
         gst_cov = ellipse_cov / np.sqrt(var_north * var_east) * gst_north * gst_east
     gst_cov = np.where(agrees & np.isfinite(gst_cov), gst_cov, 0.0)
     hit &= stated[at]
+    wide = (gst_north > SIGMA_LIMIT_M) | (gst_east > SIGMA_LIMIT_M)
+    gst_cov = np.where(wide, 0.0, gst_cov)
+    gst_north, gst_east = np.minimum(gst_north, SIGMA_LIMIT_M), np.minimum(gst_east, SIGMA_LIMIT_M)
     east[hit], north[hit], cov[hit] = gst_east[at[hit]], gst_north[at[hit]], gst_cov[at[hit]]
     return east, north, cov
 

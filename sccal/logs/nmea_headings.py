@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.limits import SIGMA_LIMIT_RAD
 from sccal.logs.nmea_positions import KIND_NAMES
 from sccal.logs.nmea_times import UNTIMED, Dated, epoch_key, epochs_of_untimed
 from sccal.logs.sentences import Kind, Sentences, talker_name
@@ -269,14 +270,14 @@ def _epochs(dated: Dated, readings: _Readings, name: str, notices: list[Notice])
 def _stated(sigma_deg: Floats | None) -> Floats | None:
     if sigma_deg is None or not (sigma_deg > 0).any():
         return None
-    return np.radians(np.where(sigma_deg > 0, sigma_deg, np.nan))
+    return np.minimum(np.radians(np.where(sigma_deg > 0, sigma_deg, np.nan)), SIGMA_LIMIT_RAD)
 
 
 def _filled(angle_deg: Floats | None, t_s: Floats) -> Floats | None:
     """In radians, gaps filled in between their neighbours; None where half of it or more is missing."""
     if angle_deg is None:
         return None
-    known = np.isfinite(angle_deg)
+    known = np.abs(angle_deg) <= 360.0
     if known.mean() <= 0.5:
         return None
     return np.radians(angle_deg if known.all() else np.interp(t_s, t_s[known], angle_deg[known]))

@@ -10,18 +10,22 @@ as in GGA, -1 where not stated. ``state`` is what the faults made of the fix: ``
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.limits import TIME_LIMIT_S
 from sccal.logs.streams import FixStream, Reference
 
 REFERENCE_FILE = "reference.csv"
 MANIFEST_FILE = "degrade.json"
+_LONGEST_HEADER = 1000
 _COLUMNS = ["t", "lat_deg", "lon_deg", "quality", "state"]
 STATES = ("same", "displaced", "lost")
 
@@ -48,12 +52,9 @@ class ReferenceRows:
 def read_reference_rows(path: Path) -> ReferenceRows:
     """A reference file's rows. Raises DataError where the file is none."""
     try:
-        table = pd.read_csv(io.BytesIO(path.read_bytes()), dtype={"state": str})
-        if [*table.columns][: len(_COLUMNS)] != _COLUMNS or not table["state"].isin(STATES).all():
-            raise ValueError(f"the columns must be {','.join(_COLUMNS)} with state {', '.join(STATES)}")
-        numbers = {name: table[name].to_numpy(dtype=np.float64) for name in table.columns if name != "state"}
-        if not (np.isfinite(numbers["lat_deg"]) & np.isfinite(numbers["lon_deg"])).all():
-            raise ValueError("rows without a position")
+        table = _table(path.read_bytes())
+        numbers = {name: _numbers(table[name]) for name in table.columns if name != "state"}
+        _require_ranges(numbers)
         quality = numbers["quality"].astype(np.int64)
     except (OSError, ValueError) as error:
         why = " ".join(str(error).split())
@@ -68,6 +69,50 @@ def read_reference_rows(path: Path) -> ReferenceRows:
         lost=np.asarray(state == "lost"),
         displaced=np.asarray(state == "displaced"),
     )
+
+
+def _table(data: bytes) -> pd.DataFrame:
+    """The columns below the header; raises ValueError where they are not those of a reference."""
+    header = data[: data.find(b"\n", 0, _LONGEST_HEADER) + 1]
+    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+    if names[: len(_COLUMNS)] != _COLUMNS or len(set(names)) != len(names):
+        raise ValueError(f"line 1 must begin with {','.join(_COLUMNS)}; the file has {len(data)} bytes")
+    width = header.count(b",")
+    odd = next((i for i, row in enumerate(data.splitlines(), 1) if row.count(b",") != width), 0)
+    if odd:
+        raise ValueError(f"line {odd} has not {width + 1} cells")
+    table = pd.read_csv(io.BytesIO(data), dtype={"state": str}, index_col=False, skip_blank_lines=False)
+    table.columns = pd.Index(names)
+    wrong = ~table["state"].isin(STATES).to_numpy(dtype=np.bool_)
+    if wrong.any():
+        raise ValueError(f"line {_line(wrong)}: state is none of {', '.join(STATES)}")
+    return table
+
+
+def _require_ranges(numbers: Mapping[str, Floats]) -> None:
+    """Raise ValueError with the line of the first number that cannot be one of a fix."""
+    quality = numbers["quality"]
+    times = [numbers[name] for name in ("t", "utc_s") if name in numbers]
+    for wrong, what in (
+        (~((np.abs(numbers["lat_deg"]) <= 90) & (np.abs(numbers["lon_deg"]) <= 360)), "no position"),
+        (~((quality >= -1) & (quality <= 9)), "quality is none of GGA's"),
+        *((np.abs(time) > TIME_LIMIT_S, f"a time beyond {TIME_LIMIT_S:g} s") for time in times),
+    ):
+        if wrong.any():
+            raise ValueError(f"line {_line(wrong)}: {what}")
+
+
+def _numbers(column: pd.Series[Any]) -> Floats:
+    """The cells as numbers, NaN where they are empty; raises ValueError with the line of any other."""
+    values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    wrong = np.isnan(values) & column.notna().to_numpy(dtype=np.bool_)
+    if wrong.any():
+        raise ValueError(f"line {_line(wrong)}: {column.name} is no number")
+    return values
+
+
+def _line(wrong: Bools) -> int:
+    return int(np.flatnonzero(wrong)[0]) + 2
 
 
 def beside(run: Path, name: str) -> Path:

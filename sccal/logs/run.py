@@ -50,7 +50,7 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     if not paths:
         raise UsageError("no path given; name a run's folder or a folder of runs")
     found: list[RunSource] = []
-    seen: set[Path] = set()
+    seen: set[str] = set()
     for path in paths:
         root = _root(path)
         places = [path] if is_message_file(path) else _run_places(root)
@@ -63,8 +63,8 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
                 f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}, "
                 f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own"
             )
-        found += [source for source in sources if source.path.resolve() not in seen]
-        seen |= {source.path.resolve() for source in sources}
+        found += [source for source in sources if os.path.realpath(source.path) not in seen]
+        seen |= {os.path.realpath(source.path) for source in sources}
     return _with_unique_names(found)
 
 
@@ -95,6 +95,8 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     """
     if is_message_log(source.path):
         return _read_message_run(source, options or ReadOptions())
+    if not source.path.is_dir():
+        raise DataError(f"{source.path}: is not a regular file, and is not opened; copy the log itself here")
     there = [name for name in RUN_FILES if (source.path / name).is_file()]
     missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
     if missing == ["ahrs.csv"] and "gnss.nmea" in there:
@@ -102,8 +104,10 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     if not {"gnss.nmea", "gnss.csv"} & set(there):
         missing.append("gnss.nmea (or gnss.csv)")
     if missing:
+        odd = [name for name in RUN_FILES if name not in there and os.path.lexists(source.path / name)]
         raise DataError(
             f"{source.path}: lacks {', '.join(missing)}; found {', '.join(there) or 'none of the run files'}"
+            + (f"; not a regular file: {', '.join(odd)}" if odd else "")
         )
     vehicle, notices = read_vehicle(vehicle_of(source))
     wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)

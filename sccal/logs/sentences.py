@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import PAD, Bytes, Decimals, Words, parse_decimals, read_decimals, words_of
+from sccal.logs.limits import TIME_LIMIT_S
 
 Kinds = NDArray[np.uint8]
 
 _LONGEST_SENTENCE = 512
+_SHORTEST_SENTENCE = 7
+"""``$KSXT,`` and its like; what is shorter is not even counted, so that no file holds more of them than bytes by 7."""
 _LONGEST_PREFIX = 64
 _PIECE = 2**17
 _HEX = np.full(256, 255, dtype=np.uint8)
@@ -169,7 +172,8 @@ def find_sentences(raw: bytes) -> Sentences:
     mark_byte = data[marks]
     major = np.flatnonzero(mark_byte != ord(","))
     byte = mark_byte[major]
-    dollar = np.flatnonzero(byte == ord("$"))
+    dollar = np.flatnonzero(byte[:-1] == ord("$"))
+    dollar = dollar[marks[major[dollar + 1]] - marks[major[dollar]] >= _SHORTEST_SENTENCE]
     start = marks[major[dollar]]
     starred = byte[dollar + 1] == ord("*")
     mark_of_stop = major[dollar + 1]
@@ -318,6 +322,7 @@ def _host_times(data: Bytes, start: Ints, line: Ints, line_begin: Ints) -> tuple
             break
         begin = begin + loose
     times = parse_decimals(data, begin, end)
+    times[np.abs(times) > TIME_LIMIT_S] = np.nan
     odd = np.zeros(start.size, dtype=np.bool_)
     odd[own] = np.isnan(times) & ((end > begin) | ~near)
     return times[np.cumsum(first_of_line) - 1], odd

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.errors import one_line
 
 Convention = Literal["enu", "ned"]
 _NO_ARRAYS = ("utc_has_date", "extras")
@@ -34,7 +35,7 @@ class Notice:
 
     def __str__(self) -> str:
         place = f" (first at {self.where})" if self.where else ""
-        return f"{self.source}: {self.count} {self.what}{place}"
+        return one_line(f"{self.source}: {self.count} {self.what}{place}")
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from sccal.logs.timeline import order_in_time
 
 _LINE_LIMIT_BYTES = 64 * 1024
 _COLUMN_LIMIT = 1000
+_LONG_NUMBER = 64
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     source = path.name
     data = _load(path)
     names, separator, header_line, body = _split_header(data, path)
-    required = _required(names, alternatives, path)
+    required = _required(names, alternatives, path, header_line)
     notices: list[Notice] = []
     body = _without_endless_lines(body, header_line, source, notices)
     body = _without_cut_line(body, separator, len(names), header_line, source, notices)
@@ -79,7 +80,8 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     if not readable.any():
         why = "; ".join(str(notice) for notice in notices) or "nothing below the header"
         raise DataError(
-            f"{path}: no usable row of {rows_seen}, {', '.join(required)} must be numbers in every row: {why}"
+            f"{path}: no usable row of {rows_seen} below line {header_line}, "
+            f"{', '.join(required)} must be numbers in every row: {why}"
         )
     columns = {name: column[readable] for name, column in columns.items()}
     line = line[readable]
@@ -118,7 +120,9 @@ def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
             break
         start = end + 1
     else:
-        raise DataError(f"{path}: no header line; the first line names the columns, such as t,yaw_deg")
+        raise DataError(
+            f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
+        )
     separator = next((mark for mark in ",;\t" if mark in text), ",")
     names = [name.strip().strip('"').strip() for name in text.split(separator)]
     if len(names) > _COLUMN_LIMIT:
@@ -126,14 +130,14 @@ def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
     return names, separator, line, data[end + 1 :]
 
 
-def _required(names: list[str], alternatives: Sequence[Sequence[str]], path: Path) -> Sequence[str]:
+def _required(names: list[str], alternatives: Sequence[Sequence[str]], path: Path, line: int) -> Sequence[str]:
     for alternative in alternatives:
         if set(alternative) <= set(names):
             return alternative
     needed = " or ".join(",".join(alternative) for alternative in alternatives)
     shown = ",".join(names[:20])
     there = "".join(mark if mark.isprintable() else "?" for mark in shown)[:200]
-    raise DataError(f"{path}: the header needs {needed}; it has {there}")
+    raise DataError(f"{path}: the header (line {line}) needs {needed}; it has {there}")
 
 
 def _without_endless_lines(body: bytes, header_line: int, source: str, notices: list[Notice]) -> bytes:
@@ -188,7 +192,10 @@ def _parse(
         raise DataError(f"{path}: cannot be read as CSV ({' '.join(str(error).split())})") from error
     for position in range(len(names), width):
         if frame[position].notna().any():
-            raise DataError(f"{path}: the header names {len(names)} columns but the rows have {width}; name them all")
+            raise DataError(
+                f"{path}: the header (line {header_line}) names {len(names)} columns, "
+                f"but the rows have {width}; name them all"
+            )
     return frame
 
 
@@ -289,4 +296,22 @@ def _floats(series: pd.Series[Any]) -> Floats:
 
 
 def _unquoted(cell: object) -> object:
-    return cell.strip().strip('"').strip() if isinstance(cell, str) else cell
+    """A cell for pandas, which fails at whole numbers beyond the range of a float."""
+    if isinstance(cell, int):
+        return cell if abs(cell) < 1 << 64 else _beyond(cell)
+    if not isinstance(cell, str):
+        return cell
+    text = cell.strip().strip('"').strip()
+    if len(text) < _LONG_NUMBER:
+        return text
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _beyond(number: int) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf

@@ -13,6 +13,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.limits import TIME_LIMIT_S
 from sccal.logs.streams import Notice
 
 SWAP_LIMIT_S = 0.5
@@ -28,6 +29,9 @@ _LOOK_BACK_SEGMENTS = 400
 def order_in_time(t_s: Floats, line: Ints, source: str) -> tuple[Ints, tuple[Notice, ...]]:
     """Row indices (m <= n) that make finite stamps ``t_s`` (n) strictly increasing, and what was done for it."""
     order = np.arange(t_s.size, dtype=np.int64)
+    possible: Bools = np.abs(t_s) <= TIME_LIMIT_S
+    if not possible.all():
+        return _without_impossible(t_s, possible, line, source)
     steps_s = np.diff(t_s)
     notices: list[Notice] = []
     if t_s.size == 0:
@@ -40,6 +44,17 @@ def order_in_time(t_s: Floats, line: Ints, source: str) -> tuple[Ints, tuple[Not
         why = "; ".join(str(notice) for notice in notices)
         raise DataError(f"{source}: {t_s.size - order.size} of {t_s.size} rows are out of order in time: {why}")
     return order, tuple(notices)
+
+
+def _without_impossible(t_s: Floats, possible: Bools, line: Ints, source: str) -> tuple[Ints, tuple[Notice, ...]]:
+    first = int(np.flatnonzero(~possible)[0])
+    what = f"rows with bad stamps dropped (t = {t_s[first]:.6g} s, beyond {TIME_LIMIT_S:g})"
+    notice = Notice(source, what, int((~possible).sum()), f"line {line[first]}", "warning")
+    rows = np.flatnonzero(possible)
+    if rows.size < LEAST_SHARE * t_s.size:
+        raise DataError(f"{notice}; t must be seconds, not milliseconds or nanoseconds")
+    order, notices = order_in_time(t_s[rows], line[rows], source)
+    return rows[order], (notice, *notices)
 
 
 def _without_steps_back(t_s: Floats, line: Ints, source: str, notices: list[Notice]) -> Ints:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sccal.errors import DataError
+from sccal.logs.limits import TICKS_PER_REV, TRACK_M, WHEEL_RADIUS_M
 from sccal.logs.streams import Convention, Notice, Vehicle
 
 MINIMAL_VEHICLE = (
@@ -27,6 +28,9 @@ _EXAMPLES = {
     ("encoder", "counter_bits"): "counter_bits = 32",
     ("ahrs", "convention"): 'convention = "enu"',
 }
+
+_LARGEST_BYTES = 1 << 20
+_RANGES = {"wheel_radius_m": WHEEL_RADIUS_M, "track_m": TRACK_M, "ticks_per_rev": TICKS_PER_REV}
 
 
 def read_vehicle(path: Path) -> tuple[Vehicle, tuple[Notice, ...]]:
@@ -61,6 +65,9 @@ def read_vehicle(path: Path) -> tuple[Vehicle, tuple[Notice, ...]]:
 
 def _load(path: Path) -> dict[str, Any]:
     try:
+        size = path.stat().st_size
+        if size > _LARGEST_BYTES:
+            raise DataError(f"{path}: {size} bytes are no vehicle.toml; it should hold {MINIMAL_VEHICLE}")
         text = path.read_bytes().decode("utf-8-sig")
         return tomllib.loads(text.replace("\r\n", "\n"))
     except OSError as error:
@@ -93,6 +100,9 @@ def _number(tables: dict[str, dict[str, Any]], table: str, key: str, path: Path)
         number = math.inf
     if not math.isfinite(number) or number <= 0:
         raise DataError(f"{path}: [{table}] {key} = {value} must be positive and finite, such as {example}")
+    low, high = _RANGES.get(key, (0.0, math.inf))
+    if not low <= number <= high:
+        raise DataError(f"{path}: [{table}] {key} = {number:g} must lie from {low:g} to {high:g}, such as {example}")
     return number
 
 

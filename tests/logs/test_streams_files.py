@@ -75,7 +75,7 @@ def test_unknown_keys_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("unit", ["deg", "rad"])
 def test_an_ahrs_file_in_either_unit(tmp_path: Path, unit: str) -> None:
     scale = np.pi / 180 if unit == "deg" else 1.0
-    t = np.arange(5.0)
+    t = np.arange(5.0) / 5
     names = ["t", f"yaw_{unit}", f"pitch_{unit}", f"roll_{unit}", f"yaw_sigma_{unit}", "temperature_c"]
     names.append("gyro_z_dps" if unit == "deg" else "gyro_z_radps")
     columns = {name: t * (k + 1) + (name != "t") for k, name in enumerate(names)}
