@@ -10,21 +10,11 @@ from fuzz.readers import READERS, feed
 from fuzz.seeds import seeds_of
 
 CORPUS = Path(__file__).parent / "corpus"
-OPEN = {"cli/0d395dc790ed": "fixes that jump by 4000 km in mid-log: the filter's variances turn negative"}
-"""Findings that are not mended yet, with why; the mark must go when they are."""
-
-
-def _case(path: Path) -> object:
-    name = f"{path.parent.name}/{path.name}"
-    marks = [pytest.mark.xfail(reason=OPEN[name], strict=True)] if name in OPEN else []
-    return pytest.param(path, id=name, marks=marks)
-
-
-FOUND = [_case(path) for path in sorted(CORPUS.glob("*/*")) if path.is_file()]
+FOUND = sorted(path for path in CORPUS.glob("*/*") if path.is_file())
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("path", FOUND)
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_what_was_found_stays_mended(path, tmp_path):
     assert feed(READERS[path.parent.name], path.read_bytes(), tmp_path)
 

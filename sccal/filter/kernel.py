@@ -68,6 +68,7 @@ from sccal.filter.layout import (
 TWO_PI = 2.0 * math.pi
 OUTLIER_FRACTION = 0.01
 OUTLIER_AREA_M2 = 1.0e4
+OPENED_AT_MOST_M = 1.0e4
 
 
 @compiled
@@ -273,9 +274,17 @@ def _open_position(x: Floats, P: Floats, nu_e: float, nu_n: float, level: float,
     """The way back from a lock-out: forget the position, and step by step what else may have been wrong.
 
     Level 1 forgets the position; level 2 the heading too, together with the opposite change of the offset, so that
-    the AHRS reading stays explained; from level 3 on the wheels are given 5 % more.
+    the AHRS reading stays explained; from level 3 on the wheels are given 5 % more. What lies beyond OPENED_AT_MOST_M
+    is moved at once: a variance of thousands of kilometres squared leaves no digits for what a fix then teaches.
     """
     n = x.shape[0]
+    away = math.hypot(nu_e, nu_n)
+    if away > OPENED_AT_MOST_M:
+        beyond = 1.0 - OPENED_AT_MOST_M / away
+        x[0] += beyond * nu_e
+        x[1] += beyond * nu_n
+        nu_e -= beyond * nu_e
+        nu_n -= beyond * nu_n
     for state in range(2):
         for q in range(n):
             P[state, q] = 0.0
