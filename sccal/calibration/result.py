@@ -12,6 +12,7 @@ from typing import Literal
 from sccal.align.clocks import Clock
 from sccal.arrays import Bools, Floats, Ints
 from sccal.filter.forward import Noise
+from sccal.logs.inputs import InputFile
 from sccal.logs.streams import Notice, Vehicle
 
 __all__ = [
@@ -23,10 +24,12 @@ __all__ = [
     "Fit",
     "Fixes",
     "History",
+    "InputFile",
     "Noise",
     "Outage",
     "OutageWindow",
     "Parameters",
+    "Provenance",
     "Residuals",
     "Status",
     "Trajectory",
@@ -207,6 +210,17 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Provenance:
+    """What a result was made from, and with what: the same provenance gives the same result."""
+
+    inputs: tuple[InputFile, ...]
+    options: Mapping[str, str]
+    """Every option by its name, as it was in force."""
+    versions: Mapping[str, str]
+    """Of sccal and of the libraries that compute."""
+
+
+@dataclass(frozen=True)
 class Calibration:
     """One run, calibrated."""
 
@@ -236,6 +250,10 @@ class Calibration:
     unseen: tuple[Unseen, ...] = ()
     origin_alt_m: float = 0.0
     """Height at which the tangent plane lies."""
+    started_utc_s: float | None = None
+    """Unix time at which the wheels' log begins; None where the log has no date."""
+    provenance: Provenance | None = None
+    """None where the run does not come from files."""
 
 
 @dataclass(frozen=True)

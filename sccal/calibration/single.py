@@ -6,9 +6,12 @@ gives the history of the parameters and the outage figures. The constants themse
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from sccal.align import Aligned, align, build_timeline
+from sccal.align.clocks import DAY_S, ERA_S
 from sccal.arrays import Floats
 from sccal.calibration.extension import FreeEffects
 from sccal.calibration.options import CalibrationOptions
@@ -35,6 +38,9 @@ from sccal.logs.streams import Notice, Run
 SETTLED_S = 20.0
 STANDING_MPS = 0.02
 MANY_REJECTED = 0.05
+EARLIEST_UTC_S = 946684800.0
+"""2000-01-01: a clock that shows less counts from its own start."""
+LATEST_UTC_S = 4102444800.0
 
 
 def prepare(aligned: Aligned, options: CalibrationOptions) -> RunProblem:
@@ -92,9 +98,21 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             on_the_way=_trajectory(honest),
             against_reference=judged,
             unseen=unseen_parameters(problem, values),
+            started_utc_s=_started_utc_s(aligned),
         ),
         problem,
     )
+
+
+def _started_utc_s(aligned: Aligned) -> float | None:
+    """By the receiver's date or a logging clock that shows one; an era of GPS weeks too early is the receiver's."""
+    start = aligned.span_s[0]
+    own = start if EARLIEST_UTC_S < start < LATEST_UTC_S else None
+    offset = aligned.clock.offset_at_start_s
+    if offset is None or not EARLIEST_UTC_S < start - offset < LATEST_UTC_S:
+        return own
+    rolled_over = abs(offset) > DAY_S and abs(math.remainder(offset, ERA_S)) < DAY_S
+    return own if rolled_over else start - offset
 
 
 def _effects(problem: RunProblem, values: Floats, covariance: Floats) -> dict[str, dict[str, Estimate]]:

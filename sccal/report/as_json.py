@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 from sccal import __version__
@@ -23,15 +24,14 @@ from sccal.calibration.result import (
     Noise,
     Outage,
     Parameters,
+    Provenance,
     Unseen,
     VehicleCalibration,
 )
 from sccal.logs.streams import Notice
 from sccal.report.rows import parameter_rows
 from sccal.report.verdict import run_verdict, vehicle_verdict
-
-SCHEMA = "sccal.calibration/1"
-VEHICLE_RUN = "(vehicle)"
+from sccal.results.saved import SCHEMA, VEHICLE_RUN
 
 Json = dict[str, Any]
 
@@ -44,6 +44,7 @@ def calibration_json(c: Calibration) -> Json:
             "sccal_version": __version__,
             "run": c.run,
             "vehicle": c.vehicle.name,
+            "started": None if c.started_utc_s is None else utc_text(c.started_utc_s),
             "variant": variant_key(c.with_offset),
             "verdict": str(run_verdict(c)),
             "parameters": _parameters(c.parameters),
@@ -57,6 +58,7 @@ def calibration_json(c: Calibration) -> Json:
             "drive": _drive(c.drive),
             "clock": clock_block(c.clock),
             "notices": notice_blocks(c.notices),
+            "provenance": _provenance(c.provenance),
         }
     )
 
@@ -92,6 +94,21 @@ def json_text(document: Json) -> str:
 def variant_key(with_offset: bool) -> str:
     """As the files name the two filters of the paper."""
     return "sc_ekf_offset" if with_offset else "sc_ekf"
+
+
+def utc_text(utc_s: float) -> str:
+    """Unix time as ISO 8601 in UTC, to the second."""
+    return datetime.fromtimestamp(utc_s, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _provenance(provenance: Provenance | None) -> Json | None:
+    if provenance is None:
+        return None
+    return {
+        "inputs": [{"name": one.name, "bytes": one.size_bytes, "sha256": one.sha256} for one in provenance.inputs],
+        "options": dict(provenance.options),
+        "versions": dict(provenance.versions),
+    }
 
 
 def _parameters(parameters: Parameters) -> Json:

@@ -12,6 +12,7 @@ from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.calibration_mcap import write_calibration_mcap
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
+from sccal.results.saved import RESULT_FILE, TRAJECTORY_FILE
 
 MCAP_FILE = "calibration.mcap"
 
@@ -24,8 +25,8 @@ def begin_loading() -> None:
 def write_numbers(c: Calibration, folder: Path) -> None:
     """Everything of a run but the page, and so without matplotlib: JSON, both trajectories, YAML."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "calibration.json", json_text(calibration_json(c)))
-    write_text(folder / "trajectory.csv", trajectory_csv(c.trajectory))
+    write_text(folder / RESULT_FILE, json_text(calibration_json(c)))
+    write_text(folder / TRAJECTORY_FILE, trajectory_csv(c.trajectory))
     write_text(folder / "trajectory.tum", trajectory_tum(c.trajectory))
     write_text(folder / "ros2_control.yaml", ros2_control_yaml(c))
 
