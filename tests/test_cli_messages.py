@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 import sccal.batch
-from sccal.cli import READ_OPTIONS, calibrate, diagnose
+from sccal.cli.calibrate import calibrate
+from sccal.cli.diagnose import diagnose
+from sccal.cli.reading import READ_OPTIONS
 from sccal.logs.mcap_write import write_mcap
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import discover, read_run

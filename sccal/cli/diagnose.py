@@ -1,0 +1,43 @@
+"""``sccal diagnose``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sccal.cli.app import app
+from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.telling import columns, tell_failures
+
+if TYPE_CHECKING:
+    from sccal.logs.options import ReadOptions
+
+
+@app.command()
+@with_read_options
+def diagnose(
+    paths: Paths,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
+    window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0,
+    heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0,
+    *,
+    read: ReadOptions,
+) -> None:
+    """What the model lacks in the runs below PATHS: name it, add it, and judge before and after on data held out."""
+    from sccal.logs.mcap_magic import require_any_mcap
+
+    require_any_mcap(paths)
+    from sccal.batch import diagnose_paths
+    from sccal.calibration.options import CalibrationOptions
+    from sccal.report.diagnosis_text import diagnosis_text
+
+    options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
+    diagnosed, failures = diagnose_paths(paths, out, options, read)
+    width = columns()
+    for diagnosis, page in diagnosed:
+        print(diagnosis_text(diagnosis, width), end="")
+        print()
+        print(f"results in {page.parent}/, report: {page}")
+    tell_failures(failures, len(failures) + sum(len(diagnosis.runs) for diagnosis, _ in diagnosed))

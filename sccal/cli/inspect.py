@@ -1,0 +1,49 @@
+"""``sccal inspect``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sccal.cli.app import app
+from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.telling import columns, tell_failures
+
+if TYPE_CHECKING:
+    from sccal.logs.options import ReadOptions
+
+
+@app.command("inspect")
+@with_read_options
+def inspect_(
+    paths: Paths,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for a page and JSON of each run.", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+    *,
+    read: ReadOptions,
+) -> None:
+    """What is in the logs below PATHS before anything is estimated, and what their drives can show."""
+    from sccal.batch import inspect_paths
+    from sccal.report.as_json import json_text
+    from sccal.report.inspect_json import inspections_json
+    from sccal.report.inspect_text import inspection_text
+
+    inspected, failures = inspect_paths(paths, out, read)
+    if as_json:
+        failed = [(failure.name, str(failure.error)) for failure in failures]
+        print(json_text(inspections_json([one for one, _ in inspected], failed)), end="")
+    else:
+        for number, (one, page) in enumerate(inspected):
+            print(("\n" if number else "") + inspection_text(one, columns()), end="")
+            if page is not None:
+                print(f"\nreport: {page}")
+    if inspected:
+        for failure in failures:
+            print(f"sccal: {failure.name}: {failure.error}", file=sys.stderr)
+    else:
+        tell_failures(failures, len(failures))
