@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import subprocess
 import sys
 import time
 import zlib
@@ -23,6 +24,7 @@ from sccal.cli import main
 from sccal.errors import DataError, SccalError, one_line
 from sccal.logs.ahrs import read_ahrs
 from sccal.logs.encoder import read_encoder
+from sccal.logs.first_look import require_any_log
 from sccal.logs.gnss_csv import read_gnss_csv
 from sccal.logs.nmea import read_nmea
 from sccal.logs.run import discover, read_run
@@ -392,3 +394,39 @@ def test_folders_that_hold_themselves_are_walked_once(tmp_path):
     (tmp_path / "self").symlink_to(tmp_path)
     code, err, _ = sccal(tmp_path, tmp_path / "out")
     assert (code, len(err.splitlines())) == (3, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("log.mcap", bytes(100_000)),
+        ("log.mcap", b"\x89PNG\r\n\x1a\n" + bytes(1000)),
+        ("encoder.csv", b",".join(b"c%d" % i for i in range(1_000_000)) + b"\n"),
+        ("gnss.csv", b",".join(b"c%d" % i for i in range(2000)) + b"\n1,2\n"),
+        ("ahrs.csv", bytes(5_000_000)),
+        ("ahrs.csv", b"# a comment\n" * 10 + b"," * 70_000),
+    ],
+    ids=["zeros", "picture", "million columns", "many columns", "zeros in a table", "endless line"],
+)
+def test_what_cannot_be_a_log_is_refused_before_anything_heavy_is_loaded(tmp_path, name, content):
+    for one in ("encoder.csv", "ahrs.csv", "gnss.nmea", "vehicle.toml"):
+        (tmp_path / one).write_bytes(run_files()[one])
+    (tmp_path / name).write_bytes(content)
+    path = tmp_path / name if name == "log.mcap" else tmp_path
+    script = (
+        f"import sys\nsys.argv = ['sccal', 'calibrate', {str(path)!r}, '--out', {str(tmp_path / 'out')!r}]\n"
+        "from sccal.cli import main\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    print(end.code)\n"
+        "print([name for name in ('pandas', 'numba', 'scipy', 'matplotlib') if name in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert found.stdout.split("\n")[:2] == ["3", "[]"]
+    assert len(found.stderr.splitlines()) == 1
+    assert name in found.stderr
+
+
+def test_a_header_after_a_megabyte_of_comments_is_found(tmp_path):
+    path = tmp_path / "ahrs.csv"
+    path.write_bytes(b"# nothing\n" * 200_000 + b"t,yaw_deg\n" + b"".join(b"%d,1\n" % i for i in range(50)))
+    require_any_log([tmp_path])
+    assert read_ahrs(path)[0].t_s.size == 50

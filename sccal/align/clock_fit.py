@@ -15,11 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.signal import lfilter
 
 from sccal.align.path import laid_out
 from sccal.arrays import Bools, Complexes, Floats, Ints
+from sccal.compiled import compiled
 
 CELL_S = 1.0
 MOST_CELLS = 2400
@@ -247,7 +246,9 @@ def _cells(t_s: Floats, rows: Complexes, left: Complexes) -> tuple[Complexes, Fl
 
 def _no_outliers(left: Complexes) -> Bools:
     """Residuals (n,) that lie near the running median of their neighbours."""
-    east, north = (median_filter(part, NEIGHBOURS, mode="nearest") for part in (left.real, left.imag))
+    padded = np.pad(left, NEIGHBOURS // 2, mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS)
+    east, north = np.median(around.real, axis=1), np.median(around.imag, axis=1)
     off = np.hypot(left.real - east, left.imag - north)
     usual = float(np.median(off))
     return np.asarray(off <= OUTLIER_SPREADS * max(1.48 * usual, 1e-3))
@@ -272,8 +273,24 @@ def _filtered(steps: Floats, lam: float, ar: Floats) -> Floats:
     """Innovations of the columns (n, k) of one channel, and (n,) of what stood before its first step."""
     before = np.zeros((steps.shape[0], 1))
     before[0] = -lam
-    white = lfilter([1.0], [1.0, -lam], np.hstack((steps, before)), axis=0)
-    return np.asarray(lfilter(np.concatenate(([1.0], -ar)), [1.0], white, axis=0) if ar.size else white)
+    return _innovations(np.hstack((steps, before)), lam, ar)
+
+
+@compiled
+def _innovations(steps: Floats, lam: float, ar: Floats) -> Floats:
+    """w_n = s_n + λ w_n−1 down the rows, then w_n − Σ ar_k w_n−k; what is before the first row is zero."""
+    white = steps.copy()
+    for n in range(1, steps.shape[0]):
+        for column in range(steps.shape[1]):
+            white[n, column] += lam * white[n - 1, column]
+    if ar.shape[0] == 0:
+        return white
+    left = white.copy()
+    for n in range(1, steps.shape[0]):
+        for k in range(min(n, ar.shape[0])):
+            for column in range(steps.shape[1]):
+                left[n, column] -= ar[k] * white[n - 1 - k, column]
+    return left
 
 
 def _whitened(steps: tuple[Floats, Floats], filters: Filters) -> tuple[Floats, Floats]:

@@ -56,9 +56,9 @@ def calibrate(
     read: ReadOptions,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
-    from sccal.logs.mcap_magic import require_any_mcap
+    from sccal.logs.first_look import require_any_log
 
-    require_any_mcap(paths)
+    require_any_log(paths)
     import numpy as np
 
     from sccal.batch import calibrate_paths

@@ -26,9 +26,9 @@ def diagnose(
     read: ReadOptions,
 ) -> None:
     """What the model lacks in the runs below PATHS: name it, add it, and judge before and after on data held out."""
-    from sccal.logs.mcap_magic import require_any_mcap
+    from sccal.logs.first_look import require_any_log
 
-    require_any_mcap(paths)
+    require_any_log(paths)
     from sccal.batch import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.report.diagnosis_text import diagnosis_text

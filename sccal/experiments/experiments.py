@@ -9,7 +9,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from sccal.align import align
 from sccal.arrays import Floats
@@ -181,7 +181,7 @@ def _ratio(without: Floats, with_offset: Floats) -> Spread:
     mean = float(logs.mean())
     if logs.size < 2:
         return Spread(float(np.exp(mean)), float("nan"), float("nan"))
-    half = float(student.ppf(0.975, logs.size - 1) * logs.std(ddof=1) / np.sqrt(logs.size))
+    half = float(stdtrit(logs.size - 1, 0.975) * logs.std(ddof=1) / np.sqrt(logs.size))
     return Spread(float(np.exp(mean)), float(np.exp(mean - half)), float(np.exp(mean + half)))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from sccal.errors import DataError
@@ -29,17 +28,3 @@ def require_mcap(path: Path) -> None:
             f"{path}: not an MCAP file: at byte 0 stands {begin.hex(' ')}, not {MAGIC.hex(' ')}; "
             "it was never written to, or is something else"
         )
-
-
-def require_any_mcap(paths: Sequence[Path]) -> None:
-    """Where all that is given are files named .mcap, raise DataError of the first unless at least one is MCAP."""
-    if not paths or not all(path.suffix.lower() == ".mcap" and path.is_file() for path in paths):
-        return
-    failures = []
-    for path in paths:
-        try:
-            require_mcap(path)
-        except DataError as error:
-            failures.append(error)
-    if len(failures) == len(paths):
-        raise DataError("; ".join(str(failure) for failure in failures))

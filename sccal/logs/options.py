@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from sccal.logs.streams import Convention
+if TYPE_CHECKING:
+    from sccal.logs.streams import Convention
 
 TimeSource = Literal["header", "log", "publish"]
 

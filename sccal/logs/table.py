@@ -19,11 +19,10 @@ import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.first_look import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
 from sccal.logs.streams import Notice
 from sccal.logs.timeline import order_in_time
 
-_LINE_LIMIT_BYTES = 64 * 1024
-_COLUMN_LIMIT = 1000
 _LONG_NUMBER = 64
 
 
@@ -60,7 +59,8 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     """
     source = path.name
     data = _load(path)
-    names, separator, header_line, body = _split_header(data, path)
+    names, separator, header_line, below = split_header(data, path)
+    body = data[below:]
     required = _required(names, alternatives, path, header_line)
     notices: list[Notice] = []
     body = _without_endless_lines(body, header_line, source, notices)
@@ -95,39 +95,14 @@ def _load(path: Path) -> bytes:
         data = path.read_bytes()
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
-    if not data.strip(b"\0 \t\r\n"):
-        what = "is empty (0 bytes)" if not data else f"holds nothing but blanks ({len(data)} bytes)"
-        raise DataError(f"{path}: {what}; log it again or remove the run")
+    if is_blank(data):
+        raise blank_file(path, len(data))
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise DataError(f"{path}: UTF-16 text; save it as UTF-8")
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
     return data.replace(b"\0", b"?") if b"\0" in data else data
-
-
-def _split_header(data: bytes, path: Path) -> tuple[list[str], str, int, bytes]:
-    """Column names, separator, the header's line number and the bytes below it."""
-    start = line = 0
-    while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end
-        line += 1
-        if end - start > _LINE_LIMIT_BYTES:
-            raise DataError(f"{path}: line {line} has {end - start} bytes without a line end; this is not a CSV file")
-        text = data[start:end].decode("utf-8", errors="replace").strip()
-        if text and not text.startswith("#"):
-            break
-        start = end + 1
-    else:
-        raise DataError(
-            f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
-        )
-    separator = next((mark for mark in ",;\t" if mark in text), ",")
-    names = [name.strip().strip('"').strip() for name in text.split(separator)]
-    if len(names) > _COLUMN_LIMIT:
-        raise DataError(f"{path}: line {line} names {len(names)} columns, more than {_COLUMN_LIMIT}; this is not a log")
-    return names, separator, line, data[end + 1 :]
 
 
 def _required(names: list[str], alternatives: Sequence[Sequence[str]], path: Path, line: int) -> Sequence[str]:
@@ -144,13 +119,13 @@ def _without_endless_lines(body: bytes, header_line: int, source: str, notices: 
     """Blank the lines that are too long to be a row of anything."""
     breaks = np.flatnonzero(np.frombuffer(body, dtype=np.uint8) == ord("\n"))
     lengths = np.diff(np.concatenate(([-1], breaks, [len(body)])))
-    endless = np.flatnonzero(lengths > _LINE_LIMIT_BYTES)
+    endless = np.flatnonzero(lengths > LINE_LIMIT_BYTES)
     if endless.size == 0:
         return body
     lines = body.split(b"\n")
     for row in endless:
         lines[row] = b""
-    what = f"lines of more than {_LINE_LIMIT_BYTES // 1024} kB dropped"
+    what = f"lines of more than {LINE_LIMIT_BYTES // 1024} kB dropped"
     notices.append(Notice(source, what, int(endless.size), f"line {header_line + 1 + endless[0]}", "warning"))
     return b"\n".join(lines)
 
@@ -228,8 +203,8 @@ def _without_long_rows(
     mark = separator.encode()
     cells = np.array([line.count(mark) + 1 for line in lines])
     usual = int(np.median(cells[cells > 1])) if (cells > 1).any() else width
-    if usual > _COLUMN_LIMIT:
-        raise DataError(f"{path}: rows have {usual} cells, more than {_COLUMN_LIMIT}; this is not a log")
+    if usual > COLUMN_LIMIT:
+        raise DataError(f"{path}: rows have {usual} cells, more than {COLUMN_LIMIT}; this is not a log")
     width = max(width, usual)
     long = np.flatnonzero(cells > width)
     for row in long:
