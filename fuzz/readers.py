@@ -268,11 +268,29 @@ def _align(path: Path) -> str:
 
 
 def _cli(path: Path) -> str:
+    return "calibrated" if _commanded(["calibrate", str(_laid_out(path))], path) else "refused"
+
+
+def _rewritten(path: Path) -> str:
+    """A run degraded, and the same run converted to the other form."""
+    alone = path.suffix == ".mcap"
+    folder = path.with_name("run") if alone else _laid_out(path)
+    if alone:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        shutil.copy(path, folder / path.name)
+        (folder / "vehicle.toml").write_bytes(run_files()["vehicle.toml"])
+    faults = ["--sigma", "1", "--loss", "2:4", "--outliers", "0.1", "--encoder-dropout", "0.1"]
+    done = [_commanded(["degrade", str(folder), *faults], path), _commanded(["convert", str(folder)], path)]
+    return f"{sum(done)} of 2"
+
+
+def _commanded(arguments: list[str], path: Path) -> bool:
+    """Whether a command gave a result; its output goes beside ``path`` and away again."""
     from sccal.cli import main
 
-    folder = _laid_out(path)
     out, err = io.StringIO(), io.StringIO()
-    argv, sys.argv = sys.argv, ["sccal", "calibrate", str(folder), "--out", str(path.with_name("out"))]
+    argv, sys.argv = sys.argv, ["sccal", *arguments, "--out", str(path.with_name("out"))]
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             main()
@@ -286,7 +304,7 @@ def _cli(path: Path) -> str:
     _require(code in (0, 3), f"exit code {code}: {err.getvalue()[-2000:]}")
     lines = [line for line in err.getvalue().splitlines() if not line.startswith("compiling the filter")]
     _require(len(lines) == (code != 0), f"exit code {code} with {len(lines)} lines: {err.getvalue()[-2000:]}")
-    return "calibrated" if code == 0 else "refused"
+    return code == 0
 
 
 READERS = {
@@ -304,6 +322,8 @@ READERS = {
         Reader("bag", "log.bag", _message_log, text=False),
         Reader("align", "input", _align, limit_s=20.0),
         Reader("cli", "input", _cli, limit_s=60.0),
+        Reader("rewritten", "input", _rewritten, limit_s=20.0),
+        Reader("mcap_rewritten", "log.mcap", _rewritten, text=False, limit_s=20.0),
     )
 }
 

@@ -135,7 +135,7 @@ def _bag_seed() -> bytes:
 def seeds_of(reader: str) -> list[bytes]:
     """Samples for one reader (see ``fuzz.readers``)."""
     files = run_files()
-    if reader in ("align", "cli"):
+    if reader in ("align", "cli", "rewritten"):
         names = ("encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv", "vehicle.toml", "reference.csv")
         return [name.encode() + b"\n" + files[name] for name in names]
     angles = b"t,left_rad,right_rad,motor_current_a\n" + b"".join(
@@ -150,6 +150,7 @@ def seeds_of(reader: str) -> list[bytes]:
         "vehicle": lambda: [files["vehicle.toml"], b'name = "x"\n[nominal]\nwheel_radius_m = 1e-1\ntrack_m = 0.7\n'],
         "reference": lambda: [_short(files["reference.csv"])],
         "mcap": _mcap_seeds,
+        "mcap_rewritten": _mcap_seeds,
         "db3": lambda: [_db3_seed()],
         "bag": lambda: [_bag_seed()],
     }[reader]()
