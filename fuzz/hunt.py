@@ -64,7 +64,8 @@ def hunt(name: str, seconds: int, folder: Path) -> None:
         return atheris.Mutate(data, most)
 
     arguments = [
-        "hunt", str(corpus), f"-max_total_time={seconds}", f"-max_len={longest}", "-verbosity=0", "-report_slow_units=3600",
+        "hunt", str(corpus), f"-max_total_time={seconds}", f"-max_len={longest}", "-verbosity=0",
+        "-report_slow_units=3600",
         f"-timeout={int(2 * reader.limit_s) + 5}", f"-artifact_prefix={folder}/killed-", "-rss_limit_mb=4096",
     ]  # fmt: skip
     atheris.Setup(arguments, one, custom_mutator=mutation)

@@ -282,7 +282,7 @@ def _rewritten(path: Path) -> str:
         (folder / "vehicle.toml").write_bytes(run_files()["vehicle.toml"])
     faults = ["--sigma", "1", "--loss", "2:4", "--outliers", "0.1", "--encoder-dropout", "0.1"]
     done = [_commanded(["degrade", str(folder), *faults], path), _commanded(["convert", str(folder)], path)]
-    return f"{sum(done)} of 2"
+    return "rewritten" if any(done) else "refused by both"
 
 
 def _commanded(arguments: list[str], path: Path) -> bool:

@@ -119,6 +119,7 @@ def test_a_whole_column_of_impossible_counts_is_refused(tmp_path, value):
         read_encoder(path, VEHICLE)
 
 
+WHOLE_COMMANDS = {"cli", "align", "rewritten", "mcap_rewritten"}
 TABLES = {"encoder": encoder, "ahrs": ahrs, "gnss": gnss}
 
 
