@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from benchmarks.__main__ import show, timed
+from benchmarks.timing import head, show, timed
 from sccal.logs.write import gga, rmc
 
 EPOCHS = 500_000
@@ -31,7 +31,7 @@ def main() -> None:
         run.mkdir()
         write_log(run / "gnss.nmea")
         megabytes = (run / "gnss.nmea").stat().st_size / 1e6
-        print(f"{'seconds':<44}{'min':>8}{'median':>8}{'max':>8}")
+        head("degrade")
         for options in (["--sigma", "5"], ["--sigma", "5", "--multipath", "2", "--loss", "1000:20000"]):
             command = [sys.executable, "-m", "sccal", "degrade", str(run), "--out", str(Path(name) / "out"), *options]
             times = timed(lambda command=command: subprocess.run(command, check=True, capture_output=True), 3)

@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.__main__ import show, timed
+from benchmarks.timing import head, show, timed
 from sccal.logs.mcap_write import write_mcap
 from sccal.logs.run import RunSource, read_run
 from sccal.simulate.choose import settings_from
@@ -38,7 +38,7 @@ def stock_decoder(path: Path) -> float:
 
 def main() -> None:
     """Write the hour in each compression, read it, and compare."""
-    print(f"{'seconds':<44}{'min':>8}{'median':>8}{'max':>8}")
+    head("messages")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         settings = settings_from(HOUR, 1)
