@@ -1,4 +1,4 @@
-"""``python -m benchmarks``: all that is timed, one after the other; ``python -m benchmarks.messages`` times one alone."""
+"""``python -m benchmarks``: everything that is timed, in turn; ``python -m benchmarks.messages`` times a part of it."""
 
 from benchmarks import degrade, messages, pipeline
 
