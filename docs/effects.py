@@ -10,10 +10,10 @@ from sccal.effects.effect import Effect
 
 HEAD = """# Effects: what a real robot may have that the model lacks
 
-Written from the catalogue (`python docs/effects.py`). `sccal diagnose` tries all of them, and every further column of the
-log; `sccal calibrate LOGS --effects lever_arm,soft_iron` estimates those that you name. An effect's parameter is what the
-real machine does: `gnss_latency` > 0 means that the fix shows an earlier place. Where the equations have no other name,
-p is the parameter, φ a wheel's turned angle, Δθ and ω turn and turn rate, v the speed.
+Written from the catalogue (`python docs/effects.py`). `sccal diagnose` tries all of them, and every further column
+of the log; `sccal calibrate LOGS --effects lever_arm,soft_iron` estimates those that you name. An effect's parameter
+is what the real machine does: `gnss_latency` > 0 means that the fix shows an earlier place. Where the equations have
+no other name, p is the parameter, φ a wheel's turned angle, Δθ and ω turn and turn rate, v the speed.
 """
 
 

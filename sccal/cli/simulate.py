@@ -14,7 +14,9 @@ from sccal.errors import UsageError
 @app.command()
 def simulate(
     out: Annotated[Path, typer.Argument(help="Folder for the run; its name is the run's.", show_default=False)],
-    path: Annotated[str, typer.Option(help="rectangle, circle, general, straight, figure8 or rows.")] = "general",
+    path: Annotated[
+        str, typer.Option(help="general, calibration, rectangle, circle, straight, figure8 or rows.")
+    ] = "general",
     duration: Annotated[float, typer.Option(help="Length of the drive, s.", min=10.0)] = 600.0,
     seed: Annotated[int, typer.Option(help="Same seed, same bytes.", min=0)] = 0,
     settings: Annotated[

@@ -231,12 +231,39 @@ def _general(route: Route, settings: DriveSettings, rng: np.random.Generator) ->
             route.hold(_PAUSE_S)
 
 
+def _calibration(route: Route, settings: DriveSettings) -> None:
+    """The drive to make when nothing is known: two speeds, both ways round, spins, reverse, stops; 45° on each lap."""
+    slow, fast = settings.slowest_mps, settings.fastest_mps
+    slow_turn, fast_turn = 0.6 * settings.turn_rate_radps, 1.6 * settings.turn_rate_radps
+    hard = route.acceleration_mps2
+    while route.t_s < settings.duration_s:
+        route.hold(10.0)
+        route.travel(15.0, slow)
+        route.pivot(math.pi, slow_turn)
+        route.travel(15.0, fast)
+        route.pivot(-math.pi, fast_turn)
+        route.acceleration_mps2 = 0.3 * hard
+        route.travel(-10.0, settings.speed_mps)
+        route.hold(_PAUSE_S)
+        route.travel(10.0, settings.speed_mps)
+        route.acceleration_mps2 = hard
+        for speed, radius_m in ((fast, 3.0), (slow, 1.5)):
+            for side in (1.0, -1.0):
+                route.change(speed)
+                route.turn(side * 2.0 * math.pi, speed / radius_m)
+            route.change(0.0)
+        route.pivot(4.0 * math.pi, slow_turn)
+        route.pivot(-4.0 * math.pi, fast_turn)
+        route.pivot(0.25 * math.pi, fast_turn)
+
+
 _PATHS: dict[PathName, Callable[[Route, DriveSettings], None]] = {
     "rectangle": _rectangle,
     "circle": _circle,
     "straight": _straight,
     "figure8": _figure8,
     "rows": _rows,
+    "calibration": _calibration,
 }
 
 

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 from sccal.errors import UsageError
 from sccal.logs.streams import Convention
 
-PathName = Literal["rectangle", "circle", "general", "straight", "figure8", "rows"]
+PathName = Literal["rectangle", "circle", "general", "straight", "figure8", "rows", "calibration"]
 PATH_NAMES: tuple[PathName, ...] = get_args(PathName)
 Rounds = Literal["counterclockwise", "clockwise", "alternate"]
 Corners = Literal["pivot", "arc"]

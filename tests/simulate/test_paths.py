@@ -173,3 +173,19 @@ def test_distances_and_angles_come_out_exact(
 def test_a_side_too_short_for_its_corners_is_refused():
     with pytest.raises(UsageError, match="too short"):
         motion_of(path="rectangle", corners="arc", rectangle_width_m=1.5, duration_s=10.0)
+
+
+def test_a_lap_of_the_calibration_drive_has_some_of_everything():
+    steps = motion_of(path="calibration", duration_s=320.0).steps
+    hz = DriveSettings().grid_hz
+    speed, rate = steps.along_m * hz, steps.turn_rad * hz
+    straight = np.abs(rate) < 1e-6
+    cruising = {round(float(v), 2) for v in speed[straight]}
+    assert {0.3, 1.2, -0.6, 0.0} <= cruising
+    arcs = (np.abs(rate) > 1e-6) & (np.abs(speed) > 0.2)
+    spins = (np.abs(rate) > 1e-6) & (np.abs(speed) < 1e-6)
+    for turning in (arcs, spins):
+        sizes = np.abs(rate[turning])
+        assert sizes.max() > 1.8 * np.median(sizes[sizes < 0.7 * sizes.max()])
+        assert abs(steps.turn_rad[turning & (rate > 0)].sum()) > 2 * math.pi
+        assert abs(steps.turn_rad[turning & (rate < 0)].sum()) > 2 * math.pi
