@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 
 from sccal.errors import UsageError
@@ -45,13 +44,13 @@ def _judged(gate: Gate, saved: Saved, named: Named) -> GateResult:
         measured = measured.partition(":")[0]
     parameter = named.parameter
     if parameter is not None and named.field in NUMBERS_OF_AN_ESTIMATE:
-        status, reason = str(parameter["status"]), str(parameter.get("reason") or "")
-        if status in ("unobserved", "held"):
-            why = why_not_estimated(SavedEstimate(math.nan, math.nan, status, reason))
-            return _result(gate, saved, "skipped", measured, why)
-        if status == "at_bound":
-            why = why_not_estimated(SavedEstimate(math.nan, math.nan, status, reason))
-            return _result(gate, saved, "failed", measured, why)
+        estimate = SavedEstimate(0.0, 0.0, str(parameter["status"]), str(parameter.get("reason") or ""))
+        why = why_not_estimated(estimate)
+        if estimate.status in ("unobserved", "held"):
+            return _result(gate, saved, "skipped", None, why)
+        if why:
+            told = "" if measured is None else f"measured {shown(measured)}, threshold {shown(gate.threshold)}, but "
+            return _result(gate, saved, "failed", measured, f"{told}{why}")
     if measured is None:
         return _result(gate, saved, "failed", None, _why_missing(gate.name, saved))
     return _compared(gate, saved, measured)
@@ -70,10 +69,10 @@ def _compared(gate: Gate, saved: Saved, measured: float | str) -> GateResult:
         )
     if kept:
         return _result(gate, saved, "passed", measured, "")
-    is_shown, limit = shown(measured), shown(gate.threshold)
-    if is_shown == limit and isinstance(measured, float):
-        is_shown, limit = repr(measured), repr(gate.threshold)
-    return _result(gate, saved, "failed", measured, f"{gate.name} is {is_shown}, not {gate.sign} {limit}")
+    told, limit = shown(measured), shown(gate.threshold)
+    if told == limit and isinstance(measured, float):
+        told, limit = repr(measured), repr(gate.threshold)
+    return _result(gate, saved, "failed", measured, f"measured {told}, threshold {limit}")
 
 
 def _why_missing(name: str, saved: Saved) -> str:
