@@ -18,7 +18,7 @@ from typing import Any
 from sccal.errors import DataError, UsageError
 from sccal.gates.allowance import Allowance
 from sccal.gates.result import GateResult, Outcome
-from sccal.results.differences import difference, unit_of, why_not_estimated
+from sccal.results.differences import difference, unit_of, why_not_estimated, why_own_log_only
 from sccal.results.saved import (
     PARAMETERS,
     SCHEMA,
@@ -138,6 +138,8 @@ def _of_result(baseline: Baseline, allowances: Sequence[Allowance], saved: Saved
         before = earlier.estimates.get(name)
         if before is None:
             yield _skipped(saved, name, allowances, f"{against} has no {name}")
+        elif why := why_own_log_only(name.split(".")[1], key):
+            yield _skipped(saved, name, allowances, why)
         elif why := why_not_estimated(now):
             outcome: Outcome = "failed" if now.status == "estimated" else "skipped"
             expression = _expression(name, " and ".join(one.text for one in allowances))

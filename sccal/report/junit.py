@@ -2,9 +2,9 @@
 
 One ``testsuite`` for each run; in it a ``testcase`` for the calibration itself (``<error>`` where it gave nothing), one
 for each parameter (``<skipped>`` where the drive did not excite it, ``<failure>`` at a bound) and one for each gate.
-Gates on a vehicle's result have a suite of their own. Names are unique within the file and stand in ``classname`` as well,
-since GitLab shows that one and drops doubles; messages stand in the attribute and in the text, since some readers
-know only one of the two. No element or attribute beyond what Jenkins' schema has.
+Gates on a vehicle's result have a suite of their own. A suite's name is unique in the file and stands in ``classname``
+as well, since GitLab shows that one and drops doubles; messages stand in the attribute and in the text, since some
+readers know only one of the two. No element or attribute beyond what Jenkins' schema has.
 """
 
 from __future__ import annotations

@@ -50,6 +50,15 @@ def unit_of(key: str) -> str:
     return ""
 
 
+def why_own_log_only(effect: str, key: str) -> str:
+    """Why an effect's parameter means something in its own log only; empty for all others."""
+    if key == "at_s":
+        return "a moment of its own log"
+    if effect == "local_field" and key in ("east_m", "north_m"):
+        return "a place counted from its own log's origin"
+    return ""
+
+
 def why_not_estimated(estimate: SavedEstimate) -> str:
     """Why an estimate cannot stand in a comparison, in a few words and its reason; empty where it can."""
     reason = f": {estimate.reason}" if estimate.reason else ""
