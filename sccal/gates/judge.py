@@ -70,7 +70,7 @@ def _compared(gate: Gate, saved: Saved, measured: float | str) -> GateResult:
     if kept:
         return _result(gate, saved, "passed", measured, "")
     told, limit = shown(measured), shown(gate.threshold)
-    if told == limit and isinstance(measured, float):
+    if told == limit and measured != gate.threshold:
         told, limit = repr(measured), repr(gate.threshold)
     return _result(gate, saved, "failed", measured, f"measured {told}, threshold {limit}")
 
