@@ -15,7 +15,7 @@ LABELS = {
     "parameters.radius_right_m": "right radius mm",
     "parameters.radius_left_m": "left radius mm",
     "parameters.track_m": "track mm",
-    "parameters.heading_offset_deg": "heading offset deg",
+    "parameters.heading_offset_deg": "offset deg",
 }
 NONE = "-"
 
@@ -77,7 +77,7 @@ def _pairs(pairs: Sequence[Pair], width: int) -> list[str]:
             _estimate(one.b, _scale(one.name)),
             _difference(one),
             NONE if one.difference is None else _sigmas(one.difference.in_sigmas),
-            one.change,
+            NONE if one.difference is None else one.change,
         )
         for one in pairs
     ]
