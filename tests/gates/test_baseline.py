@@ -94,6 +94,12 @@ def test_shares_are_of_the_baseline_and_amounts_are_amounts(tmp_path, allowed, m
     assert result.measured == pytest.approx(moved)
 
 
+def test_a_share_of_a_negative_value_is_as_large(tmp_path):
+    before, after = (calibration() | {"effects": {"slope": {"ratio": estimate(one, 0.1)}}} for one in (-1.0, -1.05))
+    assert drift(tmp_path, before, after, "10%", of="slope").outcome == "passed"
+    assert drift(tmp_path, before, after, "1%", of="slope").outcome == "failed"
+
+
 def test_the_offset_goes_the_short_way_round(tmp_path):
     before = calibration(heading_offset_deg=estimate(179.9, 0.1))
     after = calibration(heading_offset_deg=estimate(-179.9, 0.1))
