@@ -68,13 +68,13 @@ class Saved:
     @property
     def parameters(self) -> Mapping[str, SavedEstimate]:
         """Those of PARAMETERS by key, in that order; the heading offset in degrees."""
-        return {key: _estimate(self.document["parameters"][key]) for key in PARAMETERS}
+        return {key: read_estimate(self.document["parameters"][key]) for key in PARAMETERS}
 
     @property
     def effects(self) -> Mapping[str, Mapping[str, SavedEstimate]]:
         """Effects beyond the model, and their parameters by name."""
         return {
-            effect: {name: _estimate(block) for name, block in named.items()}
+            effect: {name: read_estimate(block) for name, block in named.items()}
             for effect, named in self.document.get("effects", {}).items()
         }
 
@@ -139,7 +139,8 @@ def read_trajectory(folder: Path) -> SavedTrajectory:
     return SavedTrajectory(*table.reshape(-1, len(TRAJECTORY_COLUMNS)).T)
 
 
-def _estimate(block: Json) -> SavedEstimate:
+def read_estimate(block: Json) -> SavedEstimate:
+    """From its block in a file; raises KeyError where a part is missing, ValueError or TypeError where one is wrong."""
     nominal = block.get("nominal")
     return SavedEstimate(
         _number(block["value"]),

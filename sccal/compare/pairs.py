@@ -1,0 +1,34 @@
+"""One estimate beside another: changed if |B − A| is more than k sigmas of the difference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from sccal.compare.result import Change, Pair
+from sccal.results.differences import difference, why_not_estimated, why_own_log_only
+from sccal.results.saved import SavedEstimate
+
+
+def pairs_of(
+    prefix: str, a: Mapping[str, SavedEstimate], b: Mapping[str, SavedEstimate], sigmas: float
+) -> tuple[Pair, ...]:
+    """Every parameter of either, those of A first; ``prefix`` is ``parameters`` or ``effects.NAME``."""
+    effect = prefix.partition(".")[2]
+    return tuple(
+        _pair(f"{prefix}.{key}", effect, key, a.get(key), b.get(key), sigmas) for key in dict.fromkeys((*a, *b))
+    )
+
+
+def _pair(name: str, effect: str, key: str, a: SavedEstimate | None, b: SavedEstimate | None, sigmas: float) -> Pair:
+    if a is None or b is None:
+        return Pair(name, a, b, None, "not comparable", f"only {'B' if a is None else 'A'} has it")
+    reasons = [f"{side}: {why}" for side, one in (("A", a), ("B", b)) if (why := why_not_estimated(one))]
+    own = why_own_log_only(effect, key)
+    if own or reasons:
+        return Pair(name, a, b, None, "not comparable", own or "; ".join(reasons))
+    d = difference(key, a, b)
+    if math.isnan(d.sigma):
+        return Pair(name, a, b, None, "not comparable", "no sigma to judge by")
+    change: Change = "changed" if abs(d.amount) > sigmas * d.sigma else "unchanged"
+    return Pair(name, a, b, d, change, "")

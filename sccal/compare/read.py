@@ -1,0 +1,68 @@
+"""The two results that ``sccal compare`` is given: files, or folders that hold one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from sccal.compare.calibrations import compare_calibrations
+from sccal.compare.diagnoses import compare_diagnoses
+from sccal.compare.result import Comparison, Kind
+from sccal.errors import DataError, UsageError
+from sccal.results.diagnosis import DIAGNOSIS_FILE, DIAGNOSIS_SCHEMA, read_diagnosis
+from sccal.results.saved import RESULT_FILE, SCHEMA, VEHICLE_FILE, read_saved
+
+KINDS: dict[str, Kind] = {SCHEMA: "calibration", DIAGNOSIS_SCHEMA: "diagnosis"}
+"""By schema."""
+
+
+def compare_paths(a: Path, b: Path, sigmas: float) -> Comparison:
+    """Read both and compare them. A folder with results of both kinds is read as the other side's kind.
+
+    Raises:
+        UsageError: no such file, nothing to compare in a folder, or a calibration against a diagnosis.
+        DataError: a file is damaged or of another schema.
+    """
+    there_a, there_b = _results_at(a), _results_at(b)
+    common = [kind for kind in there_a if kind in there_b]
+    if not common:
+        raise UsageError(
+            f"{a} is a {' and a '.join(there_a)}, {b} a {' and a '.join(there_b)}: "
+            "compare two calibrations or two diagnoses"
+        )
+    if len(common) > 1:
+        raise UsageError(
+            f"{a} and {b} hold a calibration and a diagnosis each; name two files, as {there_a['calibration']} "
+            f"or {there_a['diagnosis']}"
+        )
+    file_a, file_b = there_a[common[0]], there_b[common[0]]
+    if common[0] == "calibration":
+        return compare_calibrations(read_saved(file_a), read_saved(file_b), sigmas)
+    return compare_diagnoses(read_diagnosis(file_a), read_diagnosis(file_b), sigmas)
+
+
+def _results_at(path: Path) -> dict[Kind, Path]:
+    if not path.exists():
+        raise UsageError(f"{path}: no such file or folder")
+    if path.is_dir():
+        kinds: tuple[tuple[Kind, str], ...] = (
+            ("calibration", RESULT_FILE),
+            ("calibration", VEHICLE_FILE),
+            ("diagnosis", DIAGNOSIS_FILE),
+        )
+        there: dict[Kind, Path] = {}
+        for kind, name in kinds:
+            if (path / name).is_file():
+                there.setdefault(kind, path / name)
+        if not there:
+            names = f"{RESULT_FILE}, {VEHICLE_FILE} or {DIAGNOSIS_FILE}"
+            raise UsageError(f"{path}: holds no {names}; name a file, or the folder of one run's results, as OUT/run")
+        return there
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise DataError(f"{path}: cannot be read as JSON ({error})") from error
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if not isinstance(schema, str) or schema not in KINDS:
+        raise DataError(f"{path}: its schema is {schema!r}; compare files of {' or of '.join(KINDS)}")
+    return {KINDS[schema]: path}

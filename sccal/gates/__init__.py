@@ -1,0 +1,1 @@
+"""Conditions that results must keep, and whether they do."""
