@@ -68,6 +68,7 @@ def _heading(offset: SavedEstimate) -> list[str]:
     clockwise_rad = math.radians(offset.value)
     return [
         f"# Heading offset {with_sigma(offset, 'deg')} counter-clockwise: the logged compass reads too far left.",
-        f"# What to add to its clockwise reading is {clockwise_rad:+.6f} rad. That is COMPASS_DEC (and COMPASS_AUTODEC 0)",
-        "# only if the log holds ArduPilot's own compass heading without any declination, so no line sets it.",
+        f"# What to add to its clockwise reading is {clockwise_rad:+.6f} rad. That is COMPASS_DEC",
+        "# (and COMPASS_AUTODEC 0) only if the log holds ArduPilot's own compass heading without any declination:",
+        "# no line sets it.",
     ]

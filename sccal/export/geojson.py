@@ -1,8 +1,8 @@
 """GeoJSON (RFC 7946): the path as a line, its start and its end as points; WGS 84, longitude before latitude.
 
-Coordinates have 9 decimals of a degree (0.1 mm) and no height: the robot's own is not estimated. A path across the 180th
-meridian is cut there, as section 3.1.9 asks. Dated runs have their times in UTC as ``coordinateProperties.times``, one
-for each position, unless the path is cut.
+Coordinates have 9 decimals of a degree (0.1 mm) and no height: the robot's own is not estimated. A path across the
+180th meridian is cut there, as section 3.1.9 asks. Dated runs have their times in UTC as
+``coordinateProperties.times``, one for each position, unless the path is cut.
 """
 
 from __future__ import annotations

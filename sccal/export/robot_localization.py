@@ -7,8 +7,8 @@ navsat_transform turns fixes into the EKF's world frame by one rotation that it 
     world from map grid = R(odometry_yaw) R(heading)⁻¹
 
 and ``heading`` must be 0 facing east, counter-clockwise positive. sccal's heading offset is what the AHRS reads, turned
-into enu, minus the robot's heading, so that yaw_offset is minus the offset. Both parameters are only ever added, and the
-offset found holds the declination of a magnetic AHRS already: all of it stands in yaw_offset, the declination is 0.
+into enu, minus the robot's heading, so that yaw_offset is minus the offset. Both parameters are only ever added, and
+the offset found holds the declination of a magnetic AHRS already: all of it stands in yaw_offset, the declination is 0.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def write_robot_localization(result: Result) -> str:
             "    frequency: 30.0",
             "    delay: 3.0  # s; the heading is taken from one IMU message after this: stand still",
             "    # Heading used = imu yaw + magnetic_declination_radians + yaw_offset, counter-clockwise from east.",
-            '    # The IMU message must be enu, as ROS asks: where vehicle.toml says convention = "ned", or the heading is a',
-            "    # receiver's (HDT and the like), the driver has to publish 90 deg - yaw.",
+            '    # The IMU message must be enu, as ROS asks: where vehicle.toml says convention = "ned", or the',
+            "    # heading is a receiver's (HDT and the like), the driver has to publish 90 deg - yaw.",
             *_offset(saved.parameters["heading_offset_deg"]),
             "    zero_altitude: true",
             "    publish_filtered_gps: true",
