@@ -27,7 +27,7 @@ def antenna_of(text):
 
 
 def fixes_in_world(fixes, world_yaw_rad, imu_yaw_rad, parameters, antenna):
-    """The node's odometry/gps: fixes in the grid put into the world frame, whose origin is the robot at the first fix."""
+    """The node's odometry/gps: fixes of the grid in the world frame, whose origin is the robot at the first fix."""
     heading = imu_yaw_rad + parameters["magnetic_declination_radians"] + parameters["yaw_offset"]
     origin = fixes[0] - np.exp(1j * heading) * antenna
     return np.exp(1j * (world_yaw_rad - heading)) * (fixes - origin)
@@ -103,7 +103,7 @@ def test_without_a_lever_arm_no_transform_is_made_up(ned_robot):
 
 def test_every_config_has_fifteen_places_and_fuses_what_it_says(ned_robot):
     ekf = yaml.safe_load(write_robot_localization(ned_robot.exported))["ekf_filter_node"]["ros__parameters"]
-    names = "x y z roll pitch yaw vx vy vz vroll vpitch vyaw ax ay az".split()
+    names = ["x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "vroll", "vpitch", "vyaw", "ax", "ay", "az"]
     used = {
         sensor: [name for name, on in zip(names, ekf[f"{sensor}_config"], strict=True) if on]
         for sensor in ("odom0", "odom1", "imu0")
