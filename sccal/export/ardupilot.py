@@ -31,22 +31,20 @@ def write_ardupilot(result: Result) -> str:
         "# If the origin of your positions is elsewhere, add where that middle is to every _POS_X and _POS_Y.",
         "# WENC is the left wheel's encoder, WENC2 the right wheel's: exchange the two if yours are wired otherwise.",
         "# WENC_CPR and WENC2_CPR are counts per turn of the wheel: ticks_per_rev in vehicle.toml.",
-        *_line("WENC_RADIUS", parameters["radius_left_m"], 1.0),
-        *_line("WENC2_RADIUS", parameters["radius_right_m"], 1.0),
-        *_line("WENC_POS_Y", track, -0.5),
-        *_line("WENC2_POS_Y", track, 0.5),
+        *_line("WENC_RADIUS", 1.0, "left radius", parameters["radius_left_m"]),
+        *_line("WENC2_RADIUS", 1.0, "right radius", parameters["radius_right_m"]),
+        *_line("WENC_POS_Y", -0.5, "minus half of the track,", track),
+        *_line("WENC2_POS_Y", 0.5, "half of the track,", track),
         *_antenna(result.saved.effects.get("lever_arm")),
         *_heading(parameters["heading_offset_deg"]),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _line(name: str, estimate: SavedEstimate, factor: float) -> list[str]:
+def _line(name: str, factor: float, what: str, estimate: SavedEstimate) -> list[str]:
     """A comment and a line; only comments where the data gave no value. The value is factor times the estimate."""
     if usable(estimate):
-        what = with_sigma(estimate, "m")
-        times = "" if factor == 1.0 else f"{factor:g} times "
-        return [f"# {times}{what}", f"{name},{factor * estimate.value + 0.0:.6f}"]
+        return [f"# {what} {with_sigma(estimate, 'm')}", f"{name},{factor * estimate.value + 0.0:.6f}"]
     nominal = "" if estimate.nominal is None else f" nominal {factor * estimate.nominal + 0.0:.6f},"
     return [f"# {name} left as it is:{nominal} {why_not(estimate)}"]
 
@@ -56,8 +54,8 @@ def _antenna(lever_arm: Mapping[str, SavedEstimate] | None) -> list[str]:
         return ["# The antenna's place was not estimated: GPS1_POS_X and GPS1_POS_Y are left as they are."]
     return [
         "# Before ArduPilot 4.6 these are GPS_POS1_X and GPS_POS1_Y.",
-        *_line("GPS1_POS_X", lever_arm["forward_m"], 1.0),
-        *_line("GPS1_POS_Y", lever_arm["left_m"], -1.0),
+        *_line("GPS1_POS_X", 1.0, "antenna forward", lever_arm["forward_m"]),
+        *_line("GPS1_POS_Y", -1.0, "minus antenna left,", lever_arm["left_m"]),
     ]
 
 

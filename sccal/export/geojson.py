@@ -34,7 +34,8 @@ def write_geojson(result: Result) -> str:
     for what, index in (("start", 0), ("end", -1)):
         time = {"time": utc[index]} if utc else {}
         features.append(_feature({"type": "Point", "coordinates": positions[index]}, names | {"what": what} | time))
-    return json.dumps({"type": "FeatureCollection", "features": features}, ensure_ascii=False, indent=1) + "\n"
+    rows = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
+    return f'{{"type": "FeatureCollection", "features": [\n{rows}\n]}}\n'
 
 
 def cut_at_180(positions: list[Position]) -> list[list[Position]]:

@@ -135,6 +135,11 @@ def test_a_clock_that_drifts_against_utc_is_followed():
     assert result.utc[-1] == "1970-01-01T00:33:19.500Z"
 
 
+def test_a_logging_clock_that_is_utc_is_taken_as_it_is():
+    result = placed(0.0, 0.0, [0.0, 1.0], [0.0, 1.0], started="1970-01-01T00:00:02Z")
+    assert result.utc == ["1970-01-01T00:00:00.000Z", "1970-01-01T00:00:00.100Z"]
+
+
 def test_an_offset_that_does_not_lead_to_the_start_told_is_not_used():
     for offset_s in (None, 7.0e8):
         clock = {"offset_at_start_s": offset_s, "skew_ppm": 0.0}
