@@ -49,7 +49,7 @@ def calibration_json(c: Calibration) -> Json:
             "verdict": str(run_verdict(c)),
             "parameters": _parameters(c.parameters),
             "effects": _effects(c.effects),
-            "origin": {"lat_deg": c.origin_lat_deg, "lon_deg": c.origin_lon_deg},
+            "origin": {"lat_deg": c.origin_lat_deg, "lon_deg": c.origin_lon_deg, "alt_m": c.origin_alt_m},
             "fit": _fit(c.fit),
             "outage": _outage(c.outage),
             "reference": _reference(c.against_reference),

@@ -9,6 +9,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Trajectory
+from sccal.export.tum import tum_rows
 
 CSV_HEADER = "t,east_m,north_m,yaw_rad,sigma_east_m,sigma_north_m,sigma_yaw_rad\n"
 
@@ -28,16 +29,8 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
 
 def trajectory_tum(trajectory: Trajectory) -> str:
-    """``t x y z qx qy qz qw`` for evo: in the plane, so z = qx = qy = 0, qz = sin θ/2 and qw = cos θ/2."""
-    half = 0.5 * trajectory.yaw_rad
-    return _rows(
-        "%.6f %.4f %.4f 0 0 0 %.9f %.9f\n",
-        trajectory.t_s,
-        trajectory.east_m,
-        trajectory.north_m,
-        np.sin(half),
-        np.cos(half),
-    )
+    """``t x y z qx qy qz qw`` for evo."""
+    return tum_rows(trajectory.t_s, trajectory.east_m, trajectory.north_m, trajectory.yaw_rad)
 
 
 def _rows(line: str, *columns: Floats) -> str:

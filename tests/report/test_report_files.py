@@ -40,7 +40,7 @@ def test_calibration_json_keeps_the_contract(a_run: Calibration) -> None:
     assert offset["status"] == "estimated"
     assert offset["prior_sigma"] == pytest.approx(180.0)
     assert document["parameters"]["track_m"]["nominal"] == 0.70
-    assert document["origin"] == {"lat_deg": 37.525, "lon_deg": 15.074}
+    assert document["origin"] == {"lat_deg": 37.525, "lon_deg": 15.074, "alt_m": 0.0}
     assert document["fit"]["heading_innovation_rms_deg"] == pytest.approx(0.91)
     assert {"gnss_innovation_rms_m", "nis_gnss", "nis_heading"} <= set(document["fit"])
     assert document["outage"]["windows"] == len(document["outage"]["each"]) == 8
@@ -121,7 +121,8 @@ def test_ros2_control_leaves_alone_what_was_not_estimated(an_ugly_run: Calibrati
 
 
 def test_ros2_control_of_a_whole_number_stays_a_double(a_vehicle: VehicleCalibration) -> None:
-    wide = replace(a_vehicle, vehicle=replace(a_vehicle.vehicle, track_m=1))
+    track = replace(a_vehicle.parameters.track_m, nominal=1)
+    wide = replace(a_vehicle, parameters=replace(a_vehicle.parameters, track_m=track))
     assert "wheel_separation: 1.0 " in ros2_control_yaml(wide)
     assert "3 runs together" in ros2_control_yaml(wide)
 
