@@ -31,6 +31,8 @@ APART_FROM_RUNS = 8
 """Fewest runs of which one can be set aside."""
 OFFSET_OF_THE_RUN_DEG = 5.0
 """Heading offsets that differ by more than this belong to the runs, not to the vehicle."""
+SHORTEST_SPAN_S = 600.0
+"""Runs that all begin within this stand in the order of their names: their dates say nothing."""
 _SECONDS_PER_DAY = 86400.0
 
 
@@ -117,7 +119,8 @@ def weighted_median(value: Floats, weight: Floats) -> float:
 
 def _chart(key: str, runs: Sequence[tuple[DatedRun, SavedEstimate]], of_all: int) -> Chart | NoChart:
     dates = [run for run in runs if run[0].started_s is not None]
-    by_date = len(dates) >= max(FEWEST_RUNS, len(runs) / 2) and len({run.started_s for run, _ in dates}) > 1
+    moments_s = [run.started_s for run, _ in dates if run.started_s is not None]
+    by_date = len(dates) >= max(FEWEST_RUNS, len(runs) / 2) and max(moments_s) - min(moments_s) > SHORTEST_SPAN_S
     if by_date:
         runs = sorted(dates, key=lambda run: (run[0].started_s or 0.0, run[0].saved.run))
     if len(runs) < FEWEST_RUNS:
@@ -153,6 +156,7 @@ def _chart(key: str, runs: Sequence[tuple[DatedRun, SavedEstimate]], of_all: int
         outside=(value < lower) | (value > upper),
         set_aside=apart,
         left_out=of_all - len(runs),
+        tested=trend is not None,
         trend=None if trend is None else on_all_runs(trend, used),
     )
 

@@ -100,7 +100,7 @@ class Chart:
     runs: tuple[str, ...]
     started: tuple[str | None, ...]
     by_date: bool
-    """False where too few runs have a date: then in the order of the runs."""
+    """False where too few runs have a date, or all the same: then in the order of the names."""
     at: Floats
     """Days since the first run, or 0, 1, 2 …"""
     value: Floats
@@ -119,7 +119,10 @@ class Chart:
     """So far from the runs around them that they do not take part in centre and trend."""
     left_out: int
     """Runs that did not estimate the parameter, or have no date in a chart by date."""
+    tested: bool
+    """Whether a change was looked for: enough runs, at different times."""
     trend: Trend | None
+    """None where nothing changes beyond chance."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from sccal.summary.result import Shape, Trend
 
 ALARM = 0.01
 FEWEST_RUNS = 5
-STEP_RUNS = 2
+STEP_RUNS = 3
 """Fewest runs on either side of a step."""
 ONSET_RUNS = 3
 """Fewest runs in the steady and in the drifting part."""

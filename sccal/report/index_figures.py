@@ -1,0 +1,132 @@
+"""The figures of a batch: a vehicle's control charts, and a path in a few strokes for each run."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from sccal.arrays import Floats
+from sccal.report.figures import BLUE, GREY, SKY, VERMILION, full_tick_labels, plain_ticks, styled, svg_text
+from sccal.report.index_lines import Shown, shown
+from sccal.summary.result import Chart, ThinPath, VehicleSummary
+
+PATH_UNITS = 1000
+"""Width and height of the square into which a path is drawn."""
+_WIDTH_IN = 9.6
+_PANEL_IN = 1.75
+_MARGIN = 0.06
+
+
+def control_charts(vehicle: VehicleSummary) -> str:
+    """One panel for each of a vehicle's charts: values ± sigma, centre, limits, runs outside, the change if any."""
+    charts = vehicle.charts
+    rows = (len(charts) + 1) // 2
+    height = 0.62 + rows * (_PANEL_IN + 0.42)
+    with styled(f"index {vehicle.label}"):
+        figure = Figure(figsize=(_WIDTH_IN, height))
+        panels = list(figure.subplots(rows, 2, squeeze=False).flat)
+        figure.subplots_adjust(
+            left=0.075, right=0.985, bottom=0.5 / height, top=1.0 - 0.62 / height, wspace=0.19, hspace=0.42
+        )
+        for axes, chart in zip(panels, charts, strict=False):
+            _draw(axes, chart)
+        for axes in panels[len(charts) :]:
+            axes.set_axis_off()
+        _legend(figure)
+        return svg_text(figure)
+
+
+def path_strokes(path: ThinPath) -> str:
+    """The ``d`` of an SVG path in a square of PATH_UNITS, north up; empty where there is nothing to draw."""
+    if len(path.east_m) < 2:
+        return ""
+    east, north = _fitted(path.east_m, path.north_m)
+    points = np.column_stack([east, PATH_UNITS - north]).round().astype(int)
+    steps = np.diff(points, axis=0)
+    steps = steps[(steps != 0).any(axis=1)]
+    strokes = "".join(f"l{right} {down}" for right, down in steps.tolist())
+    return f"M{points[0, 0]} {points[0, 1]}{strokes}" if strokes else ""
+
+
+def _fitted(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+    extent = max(float(np.ptp(east_m)), float(np.ptp(north_m)))
+    scale = PATH_UNITS * (1.0 - 2.0 * _MARGIN) / extent if extent > 0.0 else 0.0
+    return tuple(
+        PATH_UNITS / 2 + scale * (values - 0.5 * (values.min() + values.max())) for values in (east_m, north_m)
+    )  # type: ignore[return-value]
+
+
+def _draw(axes: Axes, chart: Chart) -> None:
+    as_shown = shown(chart.key)
+    at, edges = _abscissa(chart)
+    lower, upper = as_shown.factor * chart.lower, as_shown.factor * chart.upper
+    value, sigma = as_shown.factor * chart.value, as_shown.factor * chart.sigma
+    axes.stairs(upper, edges, baseline=lower, fill=True, color=SKY, alpha=0.25, lw=0, label="limits (3 sigma)")
+    axes.axhline(as_shown.factor * chart.centre, color=GREY, lw=0.9, label="centre")
+    low, high = _panel_limits(value, sigma, lower, upper, chart)
+    gaps = np.full_like(value, np.nan)
+    bars = np.column_stack([value - sigma, value + sigma, gaps]).ravel()
+    axes.plot(np.repeat(at, 3), bars, color=BLUE, lw=0.8, alpha=0.7)
+    inside = ~chart.outside
+    axes.plot(at[inside], value[inside], "o", ms=3.6, mew=0, color=BLUE, label="run ± 1 sigma")
+    outside = chart.outside
+    place = np.clip(value[outside], low, high)
+    axes.plot(at[outside], place, "D", ms=4.6, mew=0, color=VERMILION, clip_on=False, label="outside")
+    if chart.trend is not None:
+        step = chart.trend.shape == "step"
+        axes.plot(
+            at, as_shown.factor * chart.trend.fitted, color=VERMILION, lw=1.4, ls=(0, (5, 2)),
+            drawstyle="steps-mid" if step else "default", label="change",
+        )  # fmt: skip
+    axes.set_ylim(low, high)
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_title(_title(as_shown, chart))
+    axes.set_ylabel(as_shown.unit)
+    plain_ticks(axes, 4)
+    if chart.by_date:
+        locator = AutoDateLocator(minticks=3, maxticks=6)
+        axes.xaxis_date()
+        axes.xaxis.set_major_locator(locator)
+        axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+        axes.set_xlabel("date (UTC)")
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        full_tick_labels(axes)
+        axes.set_xlabel("run, in order")
+
+
+def _abscissa(chart: Chart) -> tuple[Floats, Floats]:
+    """Where the runs stand (n,), in days since 1970 or by number, and the borders between them (n + 1,)."""
+    if chart.by_date:
+        first = np.datetime64(str(chart.started[0])[:19])
+        at = first.astype("datetime64[s]").astype(np.int64) / 86400.0 + chart.at
+    else:
+        at = chart.at + 1.0
+    margin = max(0.03 * (at[-1] - at[0]), 1e-3)
+    edges = np.concatenate([[at[0] - margin], 0.5 * (at[1:] + at[:-1]), [at[-1] + margin]])
+    return at, edges
+
+
+def _panel_limits(value: Floats, sigma: Floats, lower: Floats, upper: Floats, chart: Chart) -> tuple[float, float]:
+    """Room for all that takes part and for the usual limits; runs far out stand at the edge."""
+    used = ~chart.set_aside
+    low = min(float((value - sigma)[used].min()), float(np.median(lower)))
+    high = max(float((value + sigma)[used].max()), float(np.median(upper)))
+    margin = max(0.08 * (high - low), 1e-9)
+    return low - margin, high + margin
+
+
+def _title(as_shown: Shown, chart: Chart) -> str:
+    count = int(chart.outside.sum())
+    return f"{as_shown.name} ({as_shown.unit})" + (f", {count} outside" if count else "")
+
+
+def _legend(figure: Figure) -> None:
+    found = {}
+    for panel in figure.axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    figure.legend(found.values(), found.keys(), loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=5)
