@@ -1,4 +1,4 @@
-"""The figures of a batch: a vehicle's control charts, and a path in a few strokes for each run."""
+"""The figures of a batch: a control chart for each parameter of a vehicle, and a path in a few strokes for each run."""
 
 from __future__ import annotations
 
@@ -11,31 +11,21 @@ from matplotlib.ticker import MaxNLocator
 from sccal.arrays import Floats
 from sccal.report.figures import BLUE, GREY, SKY, VERMILION, full_tick_labels, plain_ticks, styled, svg_text
 from sccal.report.index_lines import Shown, shown
-from sccal.summary.result import Chart, ThinPath, VehicleSummary
+from sccal.summary.result import Chart, ThinPath
 
 PATH_UNITS = 1000
 """Width and height of the square into which a path is drawn."""
-_WIDTH_IN = 9.6
-_PANEL_IN = 1.75
+_WIDTH_IN = 5.2
+_HEIGHT_IN = 2.3
 _MARGIN = 0.06
 
 
-def control_charts(vehicle: VehicleSummary) -> str:
-    """One panel for each of a vehicle's charts: values ± sigma, centre, limits, runs outside, the change if any."""
-    charts = vehicle.charts
-    rows = (len(charts) + 1) // 2
-    height = 0.62 + rows * (_PANEL_IN + 0.42)
-    with styled(f"index {vehicle.label}"):
-        figure = Figure(figsize=(_WIDTH_IN, height))
-        panels = list(figure.subplots(rows, 2, squeeze=False).flat)
-        figure.subplots_adjust(
-            left=0.075, right=0.985, bottom=0.5 / height, top=1.0 - 0.62 / height, wspace=0.19, hspace=0.42
-        )
-        for axes, chart in zip(panels, charts, strict=False):
-            _draw(axes, chart)
-        for axes in panels[len(charts) :]:
-            axes.set_axis_off()
-        _legend(figure)
+def control_chart(vehicle: str, chart: Chart) -> str:
+    """Values ± sigma, centre, limits, runs outside, and the change if there is one."""
+    with styled(f"index {vehicle} {chart.key}"):
+        figure = Figure(figsize=(_WIDTH_IN, _HEIGHT_IN))
+        axes = figure.add_axes((0.135, 0.22, 0.84, 0.67))
+        _draw(axes, chart)
         return svg_text(figure)
 
 
@@ -64,22 +54,22 @@ def _draw(axes: Axes, chart: Chart) -> None:
     at, edges = _abscissa(chart)
     lower, upper = as_shown.factor * chart.lower, as_shown.factor * chart.upper
     value, sigma = as_shown.factor * chart.value, as_shown.factor * chart.sigma
-    axes.stairs(upper, edges, baseline=lower, fill=True, color=SKY, alpha=0.25, lw=0, label="limits (3 sigma)")
-    axes.axhline(as_shown.factor * chart.centre, color=GREY, lw=0.9, label="centre")
+    axes.stairs(upper, edges, baseline=lower, fill=True, color=SKY, alpha=0.25, lw=0)
+    axes.axhline(as_shown.factor * chart.centre, color=GREY, lw=0.9)
     low, high = _panel_limits(value, sigma, lower, upper, chart)
     gaps = np.full_like(value, np.nan)
     bars = np.column_stack([value - sigma, value + sigma, gaps]).ravel()
     axes.plot(np.repeat(at, 3), bars, color=BLUE, lw=0.8, alpha=0.7)
     inside = ~chart.outside
-    axes.plot(at[inside], value[inside], "o", ms=3.6, mew=0, color=BLUE, label="run ± 1 sigma")
+    axes.plot(at[inside], value[inside], "o", ms=3.6, mew=0, color=BLUE)
     outside = chart.outside
     place = np.clip(value[outside], low, high)
-    axes.plot(at[outside], place, "D", ms=4.6, mew=0, color=VERMILION, clip_on=False, label="outside")
+    axes.plot(at[outside], place, "D", ms=4.6, mew=0, color=VERMILION, clip_on=False)
     if chart.trend is not None:
         step = chart.trend.shape == "step"
         axes.plot(
             at, as_shown.factor * chart.trend.fitted, color=VERMILION, lw=1.4, ls=(0, (5, 2)),
-            drawstyle="steps-mid" if step else "default", label="change",
+            drawstyle="steps-mid" if step else "default",
         )  # fmt: skip
     axes.set_ylim(low, high)
     axes.set_xlim(edges[0], edges[-1])
@@ -122,11 +112,3 @@ def _panel_limits(value: Floats, sigma: Floats, lower: Floats, upper: Floats, ch
 def _title(as_shown: Shown, chart: Chart) -> str:
     count = int(chart.outside.sum())
     return f"{as_shown.name} ({as_shown.unit})" + (f", {count} outside" if count else "")
-
-
-def _legend(figure: Figure) -> None:
-    found = {}
-    for panel in figure.axes:
-        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    figure.legend(found.values(), found.keys(), loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=5)

@@ -12,7 +12,7 @@ import numpy as np
 
 from sccal import __version__
 from sccal.report.html import page
-from sccal.report.index_figures import control_charts, path_strokes
+from sccal.report.index_figures import control_chart, path_strokes
 from sccal.report.index_json import JudgedGate
 from sccal.report.index_lines import (
     LEVEL_MARKS,
@@ -72,14 +72,14 @@ class SmallPath:
 
 
 @dataclass(frozen=True)
-class ChartRow:
-    """One parameter of a vehicle: its line in the table beside the figure."""
+class ChartPart:
+    """One parameter of a vehicle: its chart, and what stands below it."""
 
     name: str
     value: str
-    centre: str
     says: str
     change: str
+    svg: str
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,10 @@ class VehiclePart:
 
     label: str
     line: str
-    file: str
     link: str
-    rows: tuple[ChartRow, ...]
+    charts: tuple[ChartPart, ...]
     without: tuple[tuple[str, str], ...]
-    svg: str
+    drawn: bool
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,6 @@ def index_html(summary: Summary, gates: Sequence[JudgedGate] = ()) -> str:
     columns = _columns(summary)
     many = len(summary.vehicles) > 1
     t = summary.totals
-    drawn = _drawn(summary.vehicles)
     return page(
         "index.html.j2",
         verdict=headline(summary),
@@ -120,7 +118,7 @@ def index_html(summary: Summary, gates: Sequence[JudgedGate] = ()) -> str:
             for level, count in (("good", t.good), ("partial", t.partial), ("doubtful", t.doubtful), ("failed", t.failed))
         ],
         gates=_gates(gates),
-        vehicles=[_vehicle(vehicle, vehicle.label in drawn) for vehicle in summary.vehicles],
+        vehicles=[_vehicle(vehicle, rank < MOST_FIGURES) for rank, vehicle in enumerate(_ranked(summary.vehicles))],
         headers=[
             *(["vehicle"] if many else []),
             "started",
@@ -196,33 +194,32 @@ def _vehicle(vehicle: VehicleSummary, drawn: bool) -> VehiclePart:
     return VehiclePart(
         label=one_line(vehicle.label),
         line=vehicle_line(vehicle),
-        file="" if vehicle.file is None else vehicle.file,
         link="" if stem is None or vehicle.runs < 2 else "./" + quote(f"{stem}.html", errors="replace"),
-        rows=tuple(_chart_row(vehicle, chart) for chart in vehicle.charts),
+        charts=tuple(_chart(vehicle, chart, drawn) for chart in vehicle.charts),
         without=tuple((shown(one.key).name, one_line(one.reason)) for one in vehicle.no_charts),
-        svg=control_charts(vehicle) if drawn else "",
+        drawn=drawn,
     )
 
 
-def _chart_row(vehicle: VehicleSummary, chart: Chart) -> ChartRow:
+def _chart(vehicle: VehicleSummary, chart: Chart, drawn: bool) -> ChartPart:
     as_shown = shown(chart.key)
     shared = vehicle.parameters.get(chart.key)
-    digits = 3 if as_shown.unit == "deg" else 5
-    return ChartRow(
-        name=f"{as_shown.name} ({as_shown.unit})" if as_shown.unit else as_shown.name,
-        value="–" if shared is None else as_shown.text(shared),
-        centre=plain(as_shown.factor * chart.centre, digits),
+    return ChartPart(
+        name=as_shown.name,
+        value="" if shared is None else f"{as_shown.text(shared)} {as_shown.unit} over all runs",
         says=chart_line(chart),
         change=change_sentence(vehicle.label, chart) if chart.trend is not None else "",
+        svg=control_chart(vehicle.label, chart) if drawn else "",
     )
 
 
-def _drawn(vehicles: Sequence[VehicleSummary]) -> set[str]:
-    ranked = sorted(
-        (vehicle for vehicle in vehicles if vehicle.charts),
-        key=lambda vehicle: (-sum(chart.trend is not None for chart in vehicle.charts), -vehicle.runs),
-    )
-    return {vehicle.label for vehicle in ranked[:MOST_FIGURES]}
+def _ranked(vehicles: Sequence[VehicleSummary]) -> list[VehicleSummary]:
+    """What changes first, then what has most runs."""
+
+    def rank(vehicle: VehicleSummary) -> tuple[int, int]:
+        return -sum(chart.trend is not None for chart in vehicle.charts), -vehicle.runs
+
+    return sorted(vehicles, key=rank)
 
 
 def _gates(gates: Sequence[JudgedGate]) -> list[GateLine]:
