@@ -63,8 +63,9 @@ def _draw(axes: Axes, chart: Chart) -> None:
     inside = ~chart.outside
     axes.plot(at[inside], value[inside], "o", ms=3.6, mew=0, color=BLUE)
     outside = chart.outside
-    place = np.clip(value[outside], low, high)
-    axes.plot(at[outside], place, "D", ms=4.6, mew=0, color=VERMILION, clip_on=False)
+    edge = 0.05 * (high - low)
+    place = np.clip(value[outside], low + edge, high - edge)
+    axes.plot(at[outside], place, "D", ms=4.6, mew=0, color=VERMILION)
     if chart.trend is not None:
         step = chart.trend.shape == "step"
         axes.plot(

@@ -56,6 +56,7 @@ class TableRow:
     level: str
     mark: str
     why: str
+    """Empty where the verdict is good."""
     warnings: int
 
 
@@ -166,7 +167,7 @@ def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow
         ),
         level=_level(run.level),
         mark=LEVEL_MARKS[_level(run.level)],
-        why=one_line(run.verdict.partition(":")[2]),
+        why="" if run.level == "good" else one_line(run.verdict.partition(":")[2]),
         warnings=len(run.warnings),
     )
 
