@@ -46,7 +46,7 @@ def _fitted(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
     scale = PATH_UNITS * (1.0 - 2.0 * _MARGIN) / extent if extent > 0.0 else 0.0
     return tuple(
         PATH_UNITS / 2 + scale * (values - 0.5 * (values.min() + values.max())) for values in (east_m, north_m)
-    )  # type: ignore[return-value]
+    )
 
 
 def _draw(axes: Axes, chart: Chart) -> None:
@@ -78,10 +78,10 @@ def _draw(axes: Axes, chart: Chart) -> None:
     axes.set_ylabel(as_shown.unit)
     plain_ticks(axes, 4)
     if chart.by_date:
-        locator = AutoDateLocator(minticks=3, maxticks=6)
+        locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
         axes.xaxis_date()
         axes.xaxis.set_major_locator(locator)
-        axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+        axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
         axes.set_xlabel("date (UTC)")
     else:
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))

@@ -115,8 +115,8 @@ def index_html(summary: Summary, gates: Sequence[JudgedGate] = ()) -> str:
         verdict=headline(summary),
         total=total_line(t),
         counts=[
-            (LEVEL_MARKS[level], level, count)
-            for level, count in (("good", t.good), ("partial", t.partial), ("doubtful", t.doubtful), ("failed", t.failed))
+            (mark, level, count)
+            for (level, mark), count in zip(LEVEL_MARKS.items(), (t.good, t.partial, t.doubtful, t.failed), strict=True)
         ],
         gates=_gates(gates),
         vehicles=[_vehicle(vehicle, rank < MOST_FIGURES) for rank, vehicle in enumerate(_ranked(summary.vehicles))],
@@ -234,7 +234,9 @@ def _gates(gates: Sequence[JudgedGate]) -> list[GateLine]:
             if gate.outcome == "failed"
         )
         level = "failed" if failed else "passed" if counted["passed"] else "skipped"
-        counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in ("passed", "failed", "skipped") if counted[outcome])
+        counts = ", ".join(
+            f"{counted[outcome]} {outcome}" for outcome in ("passed", "failed", "skipped") if counted[outcome]
+        )
         lines.append(GateLine(one_line(expression), counts, level, failed))
     return lines
 

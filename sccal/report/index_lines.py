@@ -110,7 +110,9 @@ def headline(summary: Summary) -> Headline:
         return Headline("no results", tuple(also) or ("There was no run.",))
     if charts:
         tested = sum(chart.tested for vehicle in summary.vehicles for chart in vehicle.charts)
-        steady = f"No parameter changes over the runs beyond what chance explains ({_count(tested, 'chart')} looked at)."
+        steady = (
+            f"No parameter changes over the runs beyond what chance explains ({_count(tested, 'chart')} looked at)."
+        )
         few = "A chart needs 5 runs at different times to show a change; none has them."
         return Headline("steady" if tested else "too few runs", (steady if tested else few, *also))
     return Headline("too few runs", ("No parameter has enough runs for a chart over time.", *also))

@@ -50,7 +50,7 @@ def dated(saved: Saved) -> DatedRun:
     """A run and when it started; a date that cannot be read is none."""
     text = saved.document.get("started")
     try:
-        moment = datetime.fromisoformat(text)
+        moment = datetime.fromisoformat(str(text))
         moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
         return DatedRun(saved, str(text), moment.timestamp())
     except (TypeError, ValueError, OverflowError):

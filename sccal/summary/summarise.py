@@ -50,9 +50,7 @@ def summarise(runs: Sequence[Saved], vehicles: Sequence[Saved], failures: Sequen
     )  # fmt: skip
 
 
-def _by_vehicle(
-    runs: Sequence[DatedRun], vehicles: Sequence[Saved]
-) -> dict[str, tuple[Saved | None, list[DatedRun]]]:
+def _by_vehicle(runs: Sequence[DatedRun], vehicles: Sequence[Saved]) -> dict[str, tuple[Saved | None, list[DatedRun]]]:
     """By a label of each vehicle: its file and its runs."""
     groups: list[tuple[str, Saved | None, list[DatedRun]]] = []
     of_run: dict[str, int] = {}
@@ -68,12 +66,12 @@ def _by_vehicle(
                 groups.append((run.saved.vehicle, None, []))
         groups[place][2].append(run)
     labelled: dict[str, tuple[Saved | None, list[DatedRun]]] = {}
-    for name, file, its_runs in groups:
+    for name, its_file, its_runs in groups:
         count, label = 1, name
         while label in labelled:
             count += 1
             label = f"{name} ({count})"
-        labelled[label] = file, its_runs
+        labelled[label] = its_file, its_runs
     return labelled
 
 
@@ -122,7 +120,9 @@ def _line(run: DatedRun, vehicle: str, most_corners: int) -> RunLine:
             percent_of_distance=_finite(outage.get("percent_of_distance")),
         ),
         warnings=tuple(
-            str(notice.get("text", "")) for notice in document.get("notices") or [] if notice.get("severity") == "warning"
+            str(notice.get("text", ""))
+            for notice in document.get("notices") or []
+            if notice.get("severity") == "warning"
         ),
         inputs=tuple((str(one.get("name")), str(one.get("sha256"))) for one in provenance.get("inputs") or []),
         versions={str(name): str(version) for name, version in _block(provenance, "versions").items()},

@@ -8,7 +8,9 @@ change, which only makes the weights more alike.
 
 The standard error of b is the larger of two: that of the scatter about the fit (Knapp and Hartung, Statistics in
 Medicine 22, 2003, 2693–2710) and that of the runs' own sigmas, stretched where the runs' moving ranges show them too
-small. b over it is judged by Student's t with n − 2 degrees of freedom. The best of the three shapes, and of all places of a step or onset, is charged for the search (Bonferroni).
+small. b over it is judged by Student's t with n − 2 degrees of freedom, and charged for the search over the three
+shapes and all places of a step or onset (Bonferroni).
+
 Over all charts of a summary the false discovery rate is held at ALARM (Benjamini and Hochberg, J. R. Stat. Soc. B 57,
 1995, 289–300), so that of the fleets in which nothing changes less than one in a hundred is told that something does.
 """
@@ -84,7 +86,7 @@ def significant(p_values: Sequence[float], alarm: float = ALARM) -> Bools:
 
 
 def on_all_runs(trend: Trend, used: Bools) -> Trend:
-    """A trend found on the runs ``used`` (n,), told by the numbers of all runs; between them the fit is interpolated."""
+    """A trend found on the runs ``used`` (n,), with the numbers of all runs; between them the fit is interpolated."""
     index = np.flatnonzero(used)
     whole = np.interp(np.arange(len(used)), index, trend.fitted)
     return replace(trend, before=int(index[trend.before]), after=int(index[trend.after]), fitted=whole)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.results.saved import SCHEMA, VEHICLE_RUN, Saved
 from sccal.report.as_json import json_text
 from sccal.report.trajectory import CSV_HEADER
+from sccal.results.saved import SCHEMA, VEHICLE_RUN, Saved
 
 FIRST_DAY = datetime(2026, 5, 3, 9, 30, tzinfo=UTC)
 TRUE = {"radius_right_m": 0.0808, "radius_left_m": 0.0796, "track_m": 0.728, "heading_offset_deg": 12.5}
@@ -24,7 +24,11 @@ def estimate(value: float, sigma: float, status: str = "estimated") -> dict[str,
 
 
 def document(
-    run: str, started: datetime | None, parameters: dict[str, dict[str, Any]], vehicle: str = "tracked-demo", **more: Any
+    run: str,
+    started: datetime | None,
+    parameters: dict[str, dict[str, Any]],
+    vehicle: str = "tracked-demo",
+    **more: Any,
 ) -> dict[str, Any]:
     """What stands in a run's calibration.json, as far as a summary reads it."""
     return {
@@ -96,5 +100,5 @@ def written(runs: Sequence[Saved], rows: int = 300, seed: int = 1) -> None:
         saved.path.write_text(json_text(saved.document), encoding="utf-8")
         yaw = np.cumsum(rng.normal(0.0, 0.02, rows) + 0.02 * np.sin(np.arange(rows) / 200.0))
         table = np.column_stack([0.1 * np.arange(rows), np.cumsum(np.cos(yaw)) / 10, np.cumsum(np.sin(yaw)) / 10, yaw])
-        lines = ["%.6f,%.4f,%.4f,%.6f,0.01000,0.01000,0.0020000\n" % tuple(row) for row in table.tolist()]
+        lines = [f"{t:.6f},{e:.4f},{n:.4f},{y:.6f},0.01000,0.01000,0.0020000\n" for t, e, n, y in table.tolist()]
         (saved.path.parent / "trajectory.csv").write_text(CSV_HEADER + "".join(lines), encoding="utf-8")

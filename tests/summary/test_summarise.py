@@ -1,5 +1,7 @@
 """A batch in one picture: nothing is lost, order does not matter, and what cannot be told is said."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -114,7 +116,9 @@ def test_effects_have_charts_too():
 
 def test_vehicles_of_one_name_stay_apart_by_their_files():
     first, second = history(5, prefix="a"), history(5, prefix="b", seed=3)
-    summary = summarise(first + second, [of_vehicle(first, stem="vehicle-x"), of_vehicle(second, stem="vehicle-x-2")], [])
+    summary = summarise(
+        first + second, [of_vehicle(first, stem="vehicle-x"), of_vehicle(second, stem="vehicle-x-2")], []
+    )
     assert [(one.label, one.file, one.runs) for one in summary.vehicles] == [
         ("tracked-demo", "vehicle-x-2.json", 5),
         ("tracked-demo (2)", "vehicle-x.json", 5),
@@ -159,7 +163,7 @@ def test_corners_keep_every_point_near_the_line():
     east, north = np.cumsum(np.cos(yaw)), np.cumsum(np.sin(yaw))
     kept = np.flatnonzero(corners(east, north, 10_000))
     extent = max(np.ptp(east), np.ptp(north))
-    for first, last in zip(kept[:-1], kept[1:], strict=True):
+    for first, last in pairwise(kept):
         between = np.arange(first, last + 1)
         along = np.array([east[last] - east[first], north[last] - north[first]])
         offsets = np.column_stack([east[between] - east[first], north[between] - north[first]])
