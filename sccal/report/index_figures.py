@@ -15,6 +15,8 @@ from sccal.summary.result import Chart, ThinPath
 
 PATH_UNITS = 1000
 """Width and height of the square into which a path is drawn."""
+ROUGH_SIGMAS = 4.0
+"""A run whose sigma is so many times the median's does not set the limits of a panel."""
 _WIDTH_IN = 5.2
 _HEIGHT_IN = 2.3
 _MARGIN = 0.06
@@ -60,12 +62,10 @@ def _draw(axes: Axes, chart: Chart) -> None:
     gaps = np.full_like(value, np.nan)
     bars = np.column_stack([value - sigma, value + sigma, gaps]).ravel()
     axes.plot(np.repeat(at, 3), bars, color=BLUE, lw=0.8, alpha=0.7)
-    inside = ~chart.outside
-    axes.plot(at[inside], value[inside], "o", ms=3.6, mew=0, color=BLUE)
-    outside = chart.outside
     edge = 0.05 * (high - low)
-    place = np.clip(value[outside], low + edge, high - edge)
-    axes.plot(at[outside], place, "D", ms=4.6, mew=0, color=VERMILION)
+    place = np.clip(value, low + edge, high - edge)
+    for mask, marker, size, colour in ((~chart.outside, "o", 3.6, BLUE), (chart.outside, "D", 4.6, VERMILION)):
+        axes.plot(at[mask], place[mask], marker, ms=size, mew=0, color=colour)
     if chart.trend is not None:
         step = chart.trend.shape == "step"
         axes.plot(
@@ -102,8 +102,8 @@ def _abscissa(chart: Chart) -> tuple[Floats, Floats]:
 
 
 def _panel_limits(value: Floats, sigma: Floats, lower: Floats, upper: Floats, chart: Chart) -> tuple[float, float]:
-    """Room for all that takes part and for the usual limits; runs far out stand at the edge."""
-    used = ~chart.set_aside
+    """Room for the usual limits and all runs of some precision that take part; the others stand at the edge."""
+    used = ~chart.set_aside & (sigma <= ROUGH_SIGMAS * np.median(sigma))
     low = min(float((value - sigma)[used].min()), float(np.median(lower)))
     high = max(float((value + sigma)[used].max()), float(np.median(upper)))
     margin = max(0.08 * (high - low), 1e-9)

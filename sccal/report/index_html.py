@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
@@ -27,6 +27,7 @@ from sccal.report.index_lines import (
     versions_line,
 )
 from sccal.report.numbers import duration, one_line, plain
+from sccal.report.rows import STATUS_WORDS
 from sccal.results.saved import PARAMETERS, VEHICLE_RUN, SavedEstimate
 from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
 
@@ -34,6 +35,7 @@ MOST_FIGURES = 12
 """Vehicles whose charts are drawn: those that change first, then those with most runs."""
 MOST_PATHS = 1000
 MOST_EFFECT_COLUMNS = 6
+_STATUS_WORDS: Mapping[str, str] = {str(status): words for status, words in STATUS_WORDS.items()}
 
 
 @dataclass(frozen=True)
@@ -175,7 +177,7 @@ def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow
 def _estimate(column: Shown, estimate: SavedEstimate | None) -> Cell:
     if estimate is None:
         return Cell("–", "")
-    tag = "" if estimate.status == "estimated" else one_line(estimate.status.replace("_", " "))
+    tag = "" if estimate.status == "estimated" else _STATUS_WORDS.get(estimate.status, one_line(estimate.status))
     known = estimate.status != "unobserved"
     return Cell(column.text(estimate), _key(column.factor * estimate.value) if known else "", tag)
 

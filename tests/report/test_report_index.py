@@ -111,7 +111,7 @@ def test_every_run_stands_in_the_table_with_its_numbers_and_link(summary):
         assert f'href="./{run.run}/report.html"' in html
         value = run.parameters["radius_right_m"].value
         assert any(cell.startswith(f"{1000 * value:.3f}"[:6]) for cell in rows[run.run])
-    assert "not observed" in " ".join(rows["run002"])
+    assert "– not observed" in rows["run002"]
     assert "1 warning" in " ".join(rows["run003"])
     assert {len(rows[run.run]) for run in summary.runs} == {12}
 
