@@ -9,7 +9,7 @@ change, which only makes the weights more alike.
 The standard error of b is the larger of two: that of the scatter about the fit (Knapp and Hartung, Statistics in
 Medicine 22, 2003, 2693–2710) and that of the runs' own sigmas, stretched where the runs' moving ranges show them too
 small. b over it is judged by Student's t with n − 2 degrees of freedom, and charged for the search over the three
-shapes and all places of a step or onset (Bonferroni).
+shapes and all places of a step or onset (Bonferroni). A change that is gone without one run is none.
 
 Over all charts of a summary the false discovery rate is held at ALARM (Benjamini and Hochberg, J. R. Stat. Soc. B 57,
 1995, 289–300), so that of the fleets in which nothing changes less than one in a hundred is told that something does.
@@ -35,6 +35,8 @@ ONSET_RUNS = 3
 """Fewest runs in the steady and in the drifting part."""
 MEDIAN_OF_A_NORMAL = 0.674489750196
 """Median size of a standard normal number."""
+STILL_SEEN = 0.05
+"""Chance below which a change is still seen without its weightiest run, not charged for any search."""
 PLACES = 200
 """Most places tried for an onset; more runs are tried at evenly chosen ones."""
 
@@ -67,7 +69,7 @@ def best_trend(at: Floats, value: Floats, sigma: Floats, by_date: bool) -> Trend
         shape=shaped.shape,
         change=slope * rise * scale,
         sigma=sigma_slope * rise * scale,
-        p_value=float(chance[best]),
+        p_value=float(chance[best]) if _holds_without_one(column, y, s) else 1.0,
         before=before,
         after=after,
         days=float(at[after] - at[before]) if by_date else None,
@@ -154,6 +156,17 @@ def _judged(columns: Floats, y: Floats, s: Floats) -> tuple[Floats, Floats]:
     by_scatter = left_over / (len(y) - 2) / information
     by_own = (centred**2 @ (w * s) ** 2) / information**2 * stretch(y, s) ** 2
     return np.abs(slope) / np.sqrt(np.maximum(by_scatter, by_own)), left_over
+
+
+def _holds_without_one(column: Floats, y: Floats, s: Floats) -> bool:
+    """Whether the change is still seen without the run on which it rests most: one run makes no trend."""
+    w = 1.0 / (s**2 + between_runs(y, s))
+    leverage = w * (column - (w @ column) / w.sum()) ** 2
+    rest = np.arange(len(y)) != int(np.argmax(leverage))
+    if np.ptp(column[rest]) == 0.0:
+        return False
+    t, _ = _judged(column[None, rest], y[rest], s[rest])
+    return bool(2.0 * stdtr(len(y) - 3, -t[0]) < STILL_SEEN)
 
 
 def _fitted(column: Floats, y: Floats, s: Floats) -> tuple[float, float, float]:

@@ -100,6 +100,12 @@ def test_one_bad_run_does_not_hide_a_drift():
     assert best_trend(at[~aside], value[~aside], sigma[~aside], True).p_value < 1e-4
 
 
+def test_one_late_run_far_off_is_no_trend():
+    at = np.array([0.3, 28.4, 30.0, 30.1, 33.7, 49.3])
+    value = np.array([-0.4, -1.1, -0.8, -0.8, 1.0, 15.8])
+    assert best_trend(at, value, np.ones(6), True).p_value == 1.0
+
+
 def test_a_step_sets_no_run_aside():
     rng = np.random.default_rng(5)
     value = rng.normal(size=30) + 50.0 * (np.arange(30) > 11)
