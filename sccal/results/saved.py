@@ -121,8 +121,8 @@ def read_saved(path: Path) -> Saved:
     return saved
 
 
-def read_trajectory(folder: Path) -> SavedTrajectory:
-    """trajectory.csv of a folder of results.
+def read_trajectory(folder: Path, most_rows: int | None = None) -> SavedTrajectory:
+    """trajectory.csv of a folder of results; evenly chosen rows and the last one where there are more than wanted.
 
     Raises:
         DataError: it is missing or damaged.
@@ -131,12 +131,18 @@ def read_trajectory(folder: Path) -> SavedTrajectory:
     try:
         with path.open(encoding="utf-8") as file:
             header = file.readline().strip().split(",")
-            table = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
+            rows = file if most_rows is None else _evenly(file.read().splitlines(), most_rows)
+            table = np.loadtxt(rows, delimiter=",", ndmin=2, dtype=np.float64) if rows else np.empty((0, 0))
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read ({error}); calibrate again") from error
     if tuple(header) != TRAJECTORY_COLUMNS or (table.size and table.shape[1] != len(TRAJECTORY_COLUMNS)):
         raise DataError(f"{path}: its columns are {','.join(header)}, expected {','.join(TRAJECTORY_COLUMNS)}")
     return SavedTrajectory(*table.reshape(-1, len(TRAJECTORY_COLUMNS)).T)
+
+
+def _evenly(rows: list[str], most: int) -> list[str]:
+    stride = max(1, -(-(len(rows) - 1) // max(most - 1, 1)))
+    return [*rows[:-1:stride], *rows[-1:]]
 
 
 def read_estimate(block: Json) -> SavedEstimate:
