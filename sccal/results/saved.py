@@ -131,7 +131,8 @@ def read_trajectory(folder: Path, most_rows: int | None = None) -> SavedTrajecto
     try:
         with path.open(encoding="utf-8") as file:
             header = file.readline().strip().split(",")
-            rows = file if most_rows is None else _evenly(file.read().splitlines(), most_rows)
+            rows = file.read().splitlines()
+            rows = rows if most_rows is None else _evenly(rows, most_rows)
             table = np.loadtxt(rows, delimiter=",", ndmin=2, dtype=np.float64) if rows else np.empty((0, 0))
     except (OSError, ValueError) as error:
         raise DataError(f"{path}: cannot be read ({error}); calibrate again") from error
