@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sccal import __version__
 from sccal.calibration.result import Calibration, Fit, Outage, VehicleCalibration
-from sccal.report.figures import run_drawings, vehicle_drawings
+from sccal.report.advice import advice_on
+from sccal.report.facts import driven_lines, origin_lines, shown_lines
+from sccal.report.figures_run import run_drawings
+from sccal.report.figures_vehicle import vehicle_drawings
 from sccal.report.numbers import duration, one_line, plain, short
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
@@ -49,10 +53,13 @@ class RunLine:
 
 def run_html(c: Calibration) -> str:
     """The page of one run."""
+    verdict = run_verdict(c)
     return page(
         "run.html.j2",
         c=c,
-        verdict=run_verdict(c),
+        verdict=verdict,
+        advice=advice_on(c, verdict),
+        date=_date(c.started_utc_s),
         rows=(*parameter_rows(c.parameters), *effect_rows(c.effects)),
         drive=drive_line(c.drive),
         drawings=run_drawings(c),
@@ -62,6 +69,9 @@ def run_html(c: Calibration) -> str:
             ("unseen", unseen_line(c.unseen)),
         ),
         noise=(*noise_facts(c.noise), ("clock", clock_line(c.clock))),
+        shown=shown_lines(c),
+        driven=driven_lines(c.manoeuvres),
+        origins=origin_lines(c.provenance) if c.provenance else (),
         notices=warnings_first(c.notices),
         origin=f"{c.origin_lat_deg:.7f}, {c.origin_lon_deg:.7f}",
         version=__version__,
@@ -71,6 +81,7 @@ def run_html(c: Calibration) -> str:
 
 def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     """The page of several runs; it links to each run's own page, ``<run>/report.html``."""
+    verdict = vehicle_verdict(v)
     count = f"{len(v.runs)} run{'' if len(v.runs) == 1 else 's'}"
     time = duration(sum(c.drive.duration_s for c in v.runs))
     chi2 = v.consistency_chi2_per_dof
@@ -78,7 +89,8 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     return page(
         "vehicle.html.j2",
         v=v,
-        verdict=vehicle_verdict(v),
+        verdict=verdict,
+        advice=advice_on(v, verdict),
         rows=(*parameter_rows(v.parameters), *effect_rows(v.effects)),
         runs=[_run_line(c) for c in v.runs],
         total=f"{count} · {time} · {plain(sum(c.drive.distance_m for c in v.runs))} m",
@@ -114,6 +126,12 @@ def _fit_facts(fit: Fit, outage: Outage) -> tuple[tuple[str, str], ...]:
         ("outage", outage_line(outage)),
         ("how", one_line(outage.how) if outage.windows else ""),
     )
+
+
+def _date(utc_s: float | None) -> str:
+    if utc_s is None:
+        return ""
+    return f"{datetime.fromtimestamp(utc_s, tz=UTC):%Y-%m-%d %H:%M} UTC"
 
 
 def _variant(with_offset: bool) -> str:
