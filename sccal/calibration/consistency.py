@@ -56,7 +56,7 @@ def in_stretches(
     mean = np.bincount(place, nis, STRETCHES)[enough] / n
     return Consistency(
         measured=measured,
-        t_s=(span_s[0] + length * (np.arange(STRETCHES) + 0.5))[enough],
+        t_s=np.asarray(span_s[0] + length * (np.arange(STRETCHES) + 0.5), dtype=np.float64)[enough],
         nis=mean,
         low=np.asarray(chdtri(n, 1.0 - 0.5 * OUTSIDE) / n),
         high=np.asarray(chdtri(n, 0.5 * OUTSIDE) / n),

@@ -1,13 +1,22 @@
-"""What a page tells in tables beside its figures: the drive, how well it shows each parameter, and where it comes from."""
+"""What a page tells in tables beside its figures: the drive, how well it shows each parameter, and its sources."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from datetime import UTC, datetime
 
-from sccal.calibration.result import Calibration, Manoeuvre, Provenance
+from sccal.calibration.result import Calibration, Fit, Manoeuvre, Outage, Provenance
 from sccal.report.numbers import MISSING, duration, one_line, plain, short
 from sccal.report.rows import parameter_rows
+from sccal.report.summary import (
+    fixes_line,
+    headings_line,
+    outage_line,
+    recoveries_line,
+    reference_lines,
+    unseen_line,
+)
 
 KINDS = {
     "straight": "straight ahead",
@@ -91,3 +100,36 @@ def origin_lines(provenance: Provenance) -> tuple[tuple[str, str], ...]:
     versions = ", ".join(f"{one_line(name)} {one_line(text)}" for name, text in provenance.versions.items())
     options = ", ".join(f"{one_line(name)} = {one_line(text)}" for name, text in provenance.options.items())
     return (("versions", versions), ("options", options))
+
+
+def fit_facts(c: Calibration) -> tuple[tuple[str, str], ...]:
+    """Fit, drift and what these data would not show; nothing empty."""
+    facts = (
+        *fit_and_outage(c.fit, c.outage),
+        *(("judged", line) for line in reference_lines(c.against_reference)),
+        ("unseen", unseen_line(c.unseen)),
+    )
+    return tuple((name, text) for name, text in facts if text)
+
+
+def fit_and_outage(fit: Fit, outage: Outage) -> tuple[tuple[str, str], ...]:
+    """Of a run or of several."""
+    return (
+        ("fixes", fixes_line(fit)),
+        ("heading", headings_line(fit)),
+        ("filter", recoveries_line(fit)),
+        ("outage", outage_line(outage)),
+        ("how", one_line(outage.how) if outage.windows else ""),
+    )
+
+
+def started(c: Calibration) -> str:
+    """``2026-05-03 14:05 UTC``; empty where the log has no date."""
+    if c.started_utc_s is None:
+        return ""
+    return f"{datetime.fromtimestamp(c.started_utc_s, tz=UTC):%Y-%m-%d %H:%M} UTC"
+
+
+def variant(with_offset: bool) -> str:
+    """Which of the paper's filters it was."""
+    return "SC EKF with offset estimation" if with_offset else "SC EKF"

@@ -32,9 +32,9 @@ def causes_plan(c: Calibration) -> Plan:
     return Plan(
         "causes",
         "Residuals against their causes",
-        "Each dot is a measurement, each larger one the mean over a stretch of the quantity below it, with its standard "
-        "error; means that stay on zero show no trend. Red means do not: the residual follows the quantity, and the "
-        "model lacks something there.",
+        "Each dot is a measurement, each larger one the mean over a stretch of the quantity below it, with its "
+        "standard error; means that stay on zero show no trend. Red means do not: the residual follows the quantity, "
+        "and the model lacks something there.",
         _ROW * math.ceil(len(c.causes) / 2) + 6.0,
         lambda sheet: draw_causes(sheet, c.causes),
     )

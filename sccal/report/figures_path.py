@@ -14,7 +14,6 @@ from sccal.report.figures import (
     PAPER,
     POINTS,
     PURPLE,
-    SKY,
     SOFT,
     VERMILION,
     by_quality,
@@ -38,8 +37,8 @@ def path_plan(c: Calibration) -> Plan:
     )
     if c.outage.windows:
         caption += (
-            f" Rings: where each of the {len(c.outage.windows)} windows of {short(c.outage.window_s)} s begins in which "
-            "the filter was tested without fixes; the orange band is the one with the largest drift at its end."
+            f" Rings: where each of the {len(c.outage.windows)} windows of {short(c.outage.window_s)} s begins in "
+            "which the filter was tested without fixes; the orange band is the one with the largest drift at its end."
         )
     if _losses(c):
         caption += " Red bands: fixes lost or withheld."
@@ -133,6 +132,3 @@ def _scale_and_north(sheet: Sheet, panel: Panel) -> None:
     x, y = left + width - 12.0, bottom + height - 30.0
     sheet.path(np.array([(x, y + 16.0), (x - 4.5, y), (x, y + 4.0), (x + 4.5, y), (x, y + 16.0)]), fill=INK)
     sheet.text(x, y + 18.0, "N", SIZE, INK, "center", bold=True)
-
-
-

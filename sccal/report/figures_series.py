@@ -141,7 +141,9 @@ def draw_consistency(sheet: Sheet, c: Calibration) -> None:
         time, x, label = _time(c, one.t_s)
         high = min(NIS_HIGHEST, 1.15 * float(max(one.nis.max(), one.high.max(), 1.5)))
         note = f"{100.0 * one.inside:.1f} % within their 95 % region"
-        panel = _stacked(sheet, k, len(c.consistency), x, (0.0, high), f"{one.measured}: NIS per degree of freedom", label, note)
+        panel = _stacked(
+            sheet, k, len(c.consistency), x, (0.0, high), f"{one.measured}: NIS per degree of freedom", label, note
+        )
         panel.band(time, one.low, one.high, SKY)
         panel.level(1.0, INK)
         values = np.minimum(one.nis, 0.985 * high)

@@ -1,8 +1,8 @@
 """Panels for the figures of a run: scales, ticks and marks straight on a ``matplotlib.figure.Figure``.
 
-A page has some twenty panels, and a matplotlib Axes costs several times what is drawn in it. Here a panel is a few paths
-and texts in points, so that a batch's pages cost less than its filters. What a sheet holds may stand in a page of its
-own (SVG) or beside others on paper (PDF).
+A page has some twenty panels, and a matplotlib Axes costs several times what is drawn in it. Here a panel is a few
+paths and texts in points, so that a batch's pages cost less than its filters. What a sheet holds may stand in a page of
+its own (SVG) or beside others on paper (PDF).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
@@ -28,6 +29,7 @@ SMALL = 8.0
 FAR = 20.0
 """Heights of a panel beyond which a line is cut: the coordinates of a bad start would be endless."""
 Mark = Literal["line", "band", "dot", "cross", "ring", "square", "diamond"]
+Codes = npt.NDArray[np.uint8]
 _HERE = IdentityTransform()
 
 
@@ -63,7 +65,7 @@ class Sheet:
     def path(
         self,
         points: Floats,
-        codes: Floats | None = None,
+        codes: Codes | None = None,
         stroke: str | None = None,
         fill: str | None = None,
         width: float = 1.0,
@@ -73,7 +75,7 @@ class Sheet:
         round_ends: bool = False,
     ) -> None:
         """Points (n, 2) as lines, or by the codes of a ``matplotlib.path.Path`` (n,)."""
-        path = Path(np.round(points + (self.left, self.bottom), 2), codes)
+        path = Path(np.round(points + np.array((self.left, self.bottom)), 2), codes)
         path.should_simplify = False
         patch = PathPatch(
             path, fill=fill is not None, facecolor=fill or "none", edgecolor=stroke or "none",
@@ -90,7 +92,7 @@ class Sheet:
         at = np.array([x, y])
         if mark in ("line", "band"):
             thickness = 1.4 if mark == "line" else 7.0
-            self.path(at + [[-6.0, 0.0], [6.0, 0.0]], stroke=colour, width=thickness, alpha=1.0 if mark == "line" else 0.4)
+            self.path(at + _DASH, stroke=colour, width=thickness, alpha=1.0 if mark == "line" else 0.4)
         elif mark == "cross":
             self.path(at + size * _CROSS, _PAIRS, stroke=colour, width=1.0)
         else:
@@ -187,7 +189,7 @@ class Panel:
         parts = [part for part in _known(x, y) if part.stop - part.start > 1]
         if parts:
             points = np.concatenate([self.points(x[part], y[part]) for part in parts])
-            codes = np.full(len(points), Path.LINETO)
+            codes = np.full(len(points), Path.LINETO, dtype=np.uint8)
             codes[np.cumsum([0, *(part.stop - part.start for part in parts[:-1])])] = Path.MOVETO
             self.sheet.path(
                 points, codes, stroke=colour, width=width, alpha=alpha, clip=self.clip, round_ends=bold_ends
@@ -196,9 +198,7 @@ class Panel:
     def band(self, x: Floats, low: Floats, high: Floats, colour: str, alpha: float = 0.35) -> None:
         """The area between two lines, broken where a value is missing."""
         for part in _known(x, low, high):
-            edge = np.concatenate(
-                (self.points(x[part], high[part]), self.points(x[part][::-1], low[part][::-1]))
-            )
+            edge = np.concatenate((self.points(x[part], high[part]), self.points(x[part][::-1], low[part][::-1])))
             self.sheet.path(edge, fill=colour, alpha=alpha, clip=self.clip)
 
     def dots(self, x: Floats, y: Floats, colour: str, size: float = 2.4, alpha: float = 1.0) -> None:
@@ -224,9 +224,7 @@ class Panel:
         if len(ends):
             self.sheet.path(ends, _pairs(len(x)), stroke=colour, width=width, clip=self.clip)
 
-    def level(
-        self, y: float, colour: str = INK, width: float = 0.9, dashes: tuple[float, float] | None = None
-    ) -> None:
+    def level(self, y: float, colour: str = INK, width: float = 0.9, dashes: tuple[float, float] | None = None) -> None:
         """A line across, where the value is within the box."""
         if self.y[0] <= y <= self.y[1]:
             ends = self.points(np.array(self.x), np.array([y, y]))
@@ -281,8 +279,8 @@ def _far(low: float, high: float) -> tuple[float, float]:
     return low - FAR * (high - low), high + FAR * (high - low)
 
 
-def _pairs(count: int) -> Floats:
-    return np.tile([Path.MOVETO, Path.LINETO], count)
+def _pairs(count: int) -> Codes:
+    return np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=np.uint8), count)
 
 
 def _ring(corners: int, turned: float) -> Floats:
@@ -291,5 +289,6 @@ def _ring(corners: int, turned: float) -> Floats:
 
 
 _ROUND, _SQUARE, _DIAMOND = _ring(20, 0.0), _ring(4, 0.5) * 1.25, _ring(4, 0.0) * 1.3
+_DASH = np.array([(-6.0, 0.0), (6.0, 0.0)])
 _CROSS = np.array([(-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (1.0, -1.0)])
 _PAIRS = _pairs(2)
