@@ -80,6 +80,7 @@ _UNUSED_ID = re.compile(r' id="[A-Za-z0-9.]+_\d+"')
 _PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
 _SURPLUS_DECIMALS = re.compile(r"(\d\.\d\d)\d+")
 """Beyond a hundredth of a point."""
+_IDS = re.compile(r'(\bid="|#)([mp][0-9a-f]{10}\b)')
 _OUTER_BLANKS = re.compile(r"^[ \t]+|[ \t]+$", re.MULTILINE)
 _STYLE_OF_ALL = re.compile(r"<defs>\s*<style[^>]*>[^<]*</style>\s*</defs>")
 """Would hold for the whole page that the SVG stands in."""
@@ -92,6 +93,10 @@ class Drawing:
     name: str
     caption: str
     svg: str
+
+    def in_page(self) -> str:
+        """The SVG with ids of its own: two figures of one kind would else share them."""
+        return _IDS.sub(rf"\1{self.name}-\2", self.svg)
 
 
 def by_quality(quality: Ints) -> list[tuple[Bools, str, str]]:

@@ -17,10 +17,10 @@ def run_plans(c: Calibration) -> tuple[Plan, ...]:
     if c.outage.windows:
         plans.append(outage_plan(c.outage))
     plans.append(residuals_plan(c))
-    if c.causes:
-        plans.append(causes_plan(c))
     if c.consistency:
         plans.append(consistency_plan(c))
+    if c.causes:
+        plans.append(causes_plan(c))
     return tuple(plans)
 
 

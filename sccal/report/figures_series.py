@@ -41,7 +41,7 @@ def parameters_plan(c: Calibration) -> Plan:
         "Parameters over time",
         "What the filter had learnt by each moment, starting from the nominal values, with a band of ±1σ. The line "
         "across is the final value, dashed the nominal one.",
-        400.0,
+        365.0,
         lambda sheet: draw_parameters(sheet, c),
     )
 
@@ -54,7 +54,7 @@ def residuals_plan(c: Calibration) -> Plan:
         "Measured minus predicted; about 95 of 100 points belong inside the band of ±2σ, and a pattern over time is "
         "something that the model lacks. Points beyond a panel stand at its edge; where there are too many to draw, "
         "the darker band is their range.",
-        350.0,
+        340.0,
         lambda sheet: draw_residuals(sheet, c),
     )
 

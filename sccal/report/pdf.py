@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
@@ -192,19 +193,21 @@ class _Paper:
 def wrapped(text: str, size: float, width: float, bold: bool = False) -> list[str]:
     """Lines no wider than so many points; a word that is wider is broken."""
     lines: list[str] = []
-    line = ""
+    line, used = "", 0.0
+    blank = width_of("n n", size, bold) - width_of("nn", size, bold)
     for word in text.split():
-        longer = f"{line} {word}" if line else word
-        if width_of(longer, size, bold) <= width:
-            line = longer
+        needed = width_of(word, size, bold)
+        if line and used + blank + needed <= width:
+            line, used = f"{line} {word}", used + blank + needed
             continue
         if line:
             lines.append(line)
-        while width_of(word, size, bold) > width:
+        while needed > width:
             head = fitting(word, size, width, bold)
             lines.append(head)
             word = word[len(head) :]
-        line = word
+            needed = width_of(word, size, bold)
+        line, used = word, needed
     return [*lines, line] if line else lines
 
 
@@ -216,6 +219,7 @@ def fitting(text: str, size: float, width: float, bold: bool = False) -> str:
     return text[:kept]
 
 
+@lru_cache(maxsize=4096)
 def width_of(text: str, size: float, bold: bool = False) -> float:
     """Points, as it is set."""
     font = FontProperties(family=FACE, size=size, weight="bold" if bold else "normal")
