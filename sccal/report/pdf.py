@@ -34,6 +34,8 @@ A4 = (595.28, 841.89)
 MARGIN = 42.0
 TEXT, NOTE, HEADING, TITLE = 9.0, 7.5, 12.0, 17.0
 LEADING = 1.38
+LEAST_HEIGHT = 0.75
+"""Of a drawing's own height."""
 COLOURS = {"good": GREEN, "partial": ORANGE, "doubtful": VERMILION, "unusable": VERMILION}
 _WIDTH = A4[0] - 2.0 * MARGIN
 
@@ -178,14 +180,15 @@ class _Paper:
                 sheet.text(64.0, self.y, line, TEXT)
 
     def figure(self, plan: Plan) -> None:
-        """Title, drawing and caption on one page."""
-        caption = wrapped(plan.caption, NOTE, _WIDTH)
-        needed = plan.height + HEADING * LEADING + 16.0 + len(caption) * NOTE * LEADING
-        sheet = self.room(needed)
+        """Title, drawing and caption on one page; a drawing that nearly fits is made less high."""
+        beside = HEADING * LEADING + 16.0 + len(wrapped(plan.caption, NOTE, _WIDTH)) * NOTE * LEADING
+        left = self.y - MARGIN - 14.0 - beside if self.sheet is not None else 0.0
+        height = left if LEAST_HEIGHT * plan.height < left < plan.height else plan.height
+        sheet = self.room(height + beside)
         self.space(8.0)
         self.paragraph(plan.title, HEADING, bold=True)
-        self.space(plan.height + 2.0)
-        plan.draw(Sheet(sheet.figure, MARGIN, self.y, _WIDTH, plan.height))
+        self.space(height + 2.0)
+        plan.draw(Sheet(sheet.figure, MARGIN, self.y, _WIDTH, height))
         self.paragraph(plan.caption, NOTE, SOFT)
         self.space(4.0)
 
