@@ -50,7 +50,7 @@ def advice_on(c: Calibration | VehicleCalibration, verdict: Verdict) -> Advice:
         "doubtful",
         "Doubtful: find out why before these values are used",
         "Look into the reasons above and the figures of the residuals, mend the cause, and calibrate again. "
-        "`sccal diagnose` looks for what the model lacks.",
+        "The command sccal diagnose looks for what the model lacks.",
     )
 
 

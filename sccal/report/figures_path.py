@@ -10,7 +10,6 @@ from sccal.report.figures import (
     BLUE,
     CLOUD_POINTS,
     INK,
-    ORANGE,
     PAPER,
     POINTS,
     PURPLE,
@@ -38,7 +37,7 @@ def path_plan(c: Calibration) -> Plan:
     if c.outage.windows:
         caption += (
             f" Rings: where each of the {len(c.outage.windows)} windows of {short(c.outage.window_s)} s begins in "
-            "which the filter was tested without fixes; the orange band is the one with the largest drift at its end."
+            "which the filter was tested without fixes; the pink band is the one with the largest drift at its end."
         )
     if _losses(c):
         caption += " Red bands: fixes lost or withheld."
@@ -54,7 +53,7 @@ def draw_path(sheet: Sheet, c: Calibration) -> None:
     key: list[tuple[Mark, str, str]] = []
     path = c.trajectory
     for windows, colour, name in (
-        (_worst(c.outage.windows), ORANGE, _drift_name(c)),
+        (_worst(c.outage.windows), PURPLE, _drift_name(c)),
         (_losses(c), VERMILION, "fixes lost or withheld"),
     ):
         for window in windows[:WINDOWS_SHOWN]:

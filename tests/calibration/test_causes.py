@@ -36,7 +36,26 @@ def test_means_are_those_of_a_loop(seed: int, count: int) -> None:
         if some.size >= FEWEST_IN_BIN:
             expected.append((0.5 * (a + b), some.mean(), some.std(ddof=1) / np.sqrt(some.size)))
     got = np.column_stack((found.bin_x, found.bin_mean, found.bin_sigma))
-    np.testing.assert_allclose(got, np.array(expected).reshape(-1, 3), rtol=1e-6, atol=1e-9)
+    oracle = np.array(expected).reshape(-1, 3)
+    np.testing.assert_allclose(got[:, :2], oracle[:, :2], rtol=1e-6, atol=1e-9)
+    wider = got[:, 2] / oracle[:, 2]
+    np.testing.assert_allclose(wider, wider[:1].repeat(len(wider)), rtol=1e-6)
+    assert (wider > 1.0 - 1e-9).all()
+    assert (wider < 2.5).all()
+
+
+def test_errors_that_last_are_not_taken_for_a_trend() -> None:
+    """A slow error of 5 s beside a cause that comes and goes: its means scatter as their errors say."""
+    rng = np.random.default_rng(4)
+    chances = []
+    for _ in range(60):
+        slow = np.zeros(3000)
+        steps = rng.normal(size=slow.size)
+        for k in range(1, slow.size):
+            slow[k] = 0.98 * slow[k - 1] + steps[k]
+        x = np.cumsum(rng.normal(size=slow.size)) * 0.1 + np.sin(np.arange(slow.size) / 300.0)
+        chances.append(binned("heading", "turn_rate", x, slow).chance)
+    assert np.mean(np.array(chances) < 1e-4) < 0.1
 
 
 def test_chance_tells_a_trend_from_noise() -> None:
