@@ -97,7 +97,7 @@ def binned(
 
 
 def _in_a_row(left: Floats) -> float:
-    """Measurements per independent one: the sum of the autocorrelation (of n residuals), while pairs of it are positive.
+    """Measurements per independent one: the sum of their autocorrelation (of n residuals), while pairs are positive.
 
     Geyer's initial positive sequence (Practical Markov chain Monte Carlo, Statistical Science 1992).
     """
