@@ -36,14 +36,14 @@ def advice_on(c: Calibration | VehicleCalibration, verdict: Verdict) -> Advice:
         return Advice(
             "good",
             "Good: these values may be used",
-            "Put the multipliers of ros2_control.yaml on the robot, and calibrate again after tyres or load change.",
+            f"{_deploy(usable)}, and calibrate again after tyres or load change.",
         )
     if verdict.level == "partial":
         others = _listed(row.name for row in rest)
         return Advice(
             "partial",
             f"Good in part: use {names}, not {others}",
-            f"Put ros2_control.yaml on the robot: it holds {names}, and leaves the rest nominal. "
+            f"{_deploy(usable)}; what was not estimated stays nominal there. "
             f"To get {others} too: {_reasons(rest) or 'drive straight, then turn both ways, and calibrate again.'}",
         )
     return Advice(
@@ -59,6 +59,13 @@ def _sorted(parameters: Parameters, with_offset: bool) -> tuple[list[Row], list[
     rows = [row for row in parameter_rows(parameters) if with_offset or row.key != "heading_offset_deg"]
     usable = [row for row in rows if _may_be_used(row)]
     return usable, [row for row in rows if not _may_be_used(row)]
+
+
+def _deploy(usable: list[Row]) -> str:
+    wheels = "Put the multipliers of ros2_control.yaml on the robot"
+    if not any(row.key == "heading_offset_deg" for row in usable):
+        return wheels
+    return f"{wheels}, subtract the heading offset from the AHRS's yaw (both counter-clockwise from east)"
 
 
 def _may_be_used(row: Row) -> bool:

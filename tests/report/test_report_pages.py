@@ -158,6 +158,9 @@ def test_a_run_of_which_nothing_may_be_used_is_called_unusable(a_run: Calibratio
     assert advice.level == "partial"
     assert "use right radius, left radius and heading offset, not track" in advice.title
     assert advice_on(a_run, run_verdict(a_run)).level == "good"
+    assert "subtract the heading offset" in advice_on(a_run, run_verdict(a_run)).next_step
+    without = replace(a_run, with_offset=False, parameters=replace(p, heading_offset_rad=unseen(p.heading_offset_rad)))
+    assert "heading offset" not in advice_on(without, run_verdict(without)).next_step
 
 
 def test_an_outage_without_windows_can_be_drawn(an_ugly_run: Calibration) -> None:
