@@ -50,11 +50,12 @@ def calibrate_paths(
     tell: Callable[[RunSource, Calibration | SccalError], None],
     read: ReadOptions | None = None,
     with_mcap: bool = False,
+    with_pdf: bool = False,
 ) -> Batch:
     """Calibrate every run below the paths, write what each gives to out/<run>, then the vehicles to out.
 
     ``tell`` is called after each run, with its result or with why there is none; ``read`` is for logs of messages.
-    ``with_mcap`` writes a calibration.mcap with each run's results.
+    ``with_mcap`` writes a calibration.mcap with each run's results, ``with_pdf`` a report.pdf.
     """
     sources, failures = find_runs(paths)
     batch = Batch(failures=failures)
@@ -68,7 +69,7 @@ def calibrate_paths(
             calibration, problem = calibrate_run(read_run(source, read), options)
             if options.effects:
                 calibration = with_honest_effects(calibration, problem)
-            write_calibration(calibration, out / source.name, with_mcap)
+            write_calibration(calibration, out / source.name, with_mcap, with_pdf)
         except Exception as error:
             known = as_known(error)
             batch.failures.append(Failure(source.name, known))

@@ -18,13 +18,16 @@ from sccal.logs.streams import Notice, Vehicle
 __all__ = [
     "AgainstReference",
     "Calibration",
+    "Cause",
     "Clock",
+    "Consistency",
     "Drive",
     "Estimate",
     "Fit",
     "Fixes",
     "History",
     "InputFile",
+    "Manoeuvre",
     "Noise",
     "Outage",
     "OutageWindow",
@@ -210,6 +213,55 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Manoeuvre:
+    """One kind of driving, by the wheels: how much of it the run has."""
+
+    kind: Literal["straight", "straight_back", "arc_left", "arc_right", "spin_left", "spin_right", "standing"]
+    duration_s: float
+    distance_m: float
+    turned_rad: float
+    """To the side that the kind says, or without regard to sides; not negative."""
+    speed_mps: tuple[float, float]
+    """Between these was nine tenths of the time; a spin's are those of a wheel's rim."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Accepted residuals of one kind against a quantity that may cause them, from where the start has settled."""
+
+    residual: Literal["heading", "along", "across"]
+    """Of the heading (rad), or of the fixes in the robot's direction and to its left (m)."""
+    quantity: Literal["yaw", "turn_rate", "speed", "roll", "pitch"]
+    x: Floats
+    """(n,) the quantity at the measurements: rad in (−π, π], rad/s to the left, m/s, rad left side up, rad nose up."""
+    residuals: Floats
+    """(n,)"""
+    bin_x: Floats
+    """(k,) middles of stretches of x that hold enough measurements."""
+    bin_mean: Floats
+    bin_sigma: Floats
+    """Standard errors of the means."""
+    chance: float
+    """Probability that means would lie as far from zero by chance alone; nan without means."""
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Normalised innovations squared per degree of freedom, in stretches of time; 1 is expected."""
+
+    measured: Literal["fixes", "headings"]
+    t_s: Floats
+    """(k,) middles of the stretches."""
+    nis: Floats
+    """(k,) means over the accepted measurements."""
+    low: Floats
+    """(k,) 95 of 100 means lie between low and high if the stated noise is right."""
+    high: Floats
+    inside: float
+    """Share of single measurements within their own 95 % region."""
+
+
+@dataclass(frozen=True)
 class Provenance:
     """What a result was made from, and with what: the same provenance gives the same result."""
 
@@ -254,6 +306,9 @@ class Calibration:
     """Unix time at which the wheels' log begins; None where the log has no date."""
     provenance: Provenance | None = None
     """None where the run does not come from files."""
+    causes: tuple[Cause, ...] = ()
+    consistency: tuple[Consistency, ...] = ()
+    manoeuvres: tuple[Manoeuvre, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,10 @@ import numpy as np
 from sccal.align import Aligned, align, build_timeline
 from sccal.align.clocks import DAY_S, ERA_S
 from sccal.arrays import Floats
+from sccal.calibration.causes import find_causes
+from sccal.calibration.consistency import consistency_over_time
 from sccal.calibration.extension import FreeEffects
+from sccal.calibration.manoeuvres import describe_manoeuvres
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import run_with_outages
 from sccal.calibration.reference import judged_forward
@@ -99,6 +102,9 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             against_reference=judged,
             unseen=unseen_parameters(problem, values),
             started_utc_s=_started_utc_s(aligned),
+            causes=find_causes(problem, final, values, start.moving_from_s + SETTLED_S),
+            consistency=consistency_over_time(problem, final),
+            manoeuvres=describe_manoeuvres(aligned, values),
         ),
         problem,
     )

@@ -52,6 +52,7 @@ def calibrate(
     mcap: Annotated[
         bool, typer.Option("--mcap", help="Write calibration.mcap too: the results as messages beside the log's.")
     ] = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too: the page on A4.")] = False,
     *,
     read: ReadOptions,
 ) -> None:
@@ -84,7 +85,7 @@ def calibrate(
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
         withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
-    batch = calibrate_paths(paths, out, options, _tell, read, mcap)
+    batch = calibrate_paths(paths, out, options, _tell, read, mcap, pdf)
     width = columns()
     for vehicle, file in batch.vehicles:
         print()

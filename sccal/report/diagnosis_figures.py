@@ -22,7 +22,9 @@ from sccal.report.figures import (
     BLACK,
     BLUE,
     GREY,
+    PAPER,
     SKY,
+    SOFT,
     VERMILION,
     Drawing,
     full_tick_labels,
@@ -134,7 +136,7 @@ def drift_before_after(before: Judgement, after: Judgement | None) -> str:
             grid, rms = _rms_over(judgement.windows, judgement.window_s)
             end = judgement.outage_end_rms_m
             text = label if end is None else f"{label}: {plain(end, 3 if end >= 1.0 else 2)} m rms at the end"
-            axes.plot(grid, rms, color="white", lw=4.6, zorder=4)
+            axes.plot(grid, rms, color=PAPER, lw=4.6, zorder=4)
             axes.plot(grid, rms, color=colour, lw=2.8, zorder=5, label=text)
             highest = max(highest, float(np.nan_to_num(rms).max()))
         axes.set_xlim(0.0, before.window_s)
@@ -163,12 +165,12 @@ def candidates(finding: Finding, needed_nats: float) -> str:
         span = max(*gains, 0.0) - min(*gains, 0.0) or 1.0
         if math.isfinite(needed_nats) and 0.0 < needed_nats < 1.2 * span:
             axes.axvline(needed_nats, color=VERMILION, lw=1.0, ls=(0, (4, 3)), zorder=1)
-        paper = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
+        paper = {"boxstyle": "square,pad=0.1", "fc": PAPER, "ec": "none"}
         for place, one, gain in zip(places, shown, gains, strict=True):
             chosen = one.name == finding.name
             axes.annotate(
                 _bar_label(one), (0.0, place - 0.2), (2, 3), textcoords="offset points", va="bottom", ha="left",
-                color=BLACK if one.named else "#666666", fontsize=8.0, fontweight="bold" if chosen else "normal",
+                color=BLACK if one.named else SOFT, fontsize=8.0, fontweight="bold" if chosen else "normal",
                 bbox=paper, zorder=4,
             )  # fmt: skip
             end = max(gain, needed_nats if 0.0 < needed_nats < 0.1 * span and gain < needed_nats else 0.0)

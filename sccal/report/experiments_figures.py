@@ -28,6 +28,7 @@ from sccal.report.figures import (
     GREEN,
     GREY,
     ORANGE,
+    PAPER,
     SKY,
     VERMILION,
     Drawing,
@@ -130,7 +131,7 @@ def overview(e: Experiments) -> str:
             for variant, spread in spreads:
                 axes.plot([spread.low, spread.high], [y, y], color=COLOURS[variant], lw=4.5, alpha=0.35, zorder=2,
                           solid_capstyle="butt")  # fmt: skip
-                axes.plot([spread.median], [y], "o", ms=6, color=COLOURS[variant], mec="white", mew=0.7, zorder=3)
+                axes.plot([spread.median], [y], "o", ms=6, color=COLOURS[variant], mec=PAPER, mew=0.7, zorder=3)
             axes.annotate(f"× {line.ratio}", (1.02, y), xycoords=axes.get_yaxis_transform(), va="center", fontsize=8.5)
         for y, title in groups:
             axes.annotate(title, (-0.29, y), xycoords=axes.get_yaxis_transform(), va="center", fontweight="bold")

@@ -8,19 +8,17 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sccal import __version__
-from sccal.calibration.result import Calibration, Fit, Outage, VehicleCalibration
-from sccal.report.figures import run_drawings, vehicle_drawings
+from sccal.calibration.result import Calibration, VehicleCalibration
+from sccal.report.advice import advice_on
+from sccal.report.facts import driven_lines, fit_and_outage, fit_facts, origin_lines, shown_lines, started, variant
+from sccal.report.figures_run import run_drawings
+from sccal.report.figures_vehicle import vehicle_drawings
 from sccal.report.numbers import duration, one_line, plain, short
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
     clock_line,
     drive_line,
-    fixes_line,
-    headings_line,
     noise_facts,
-    outage_line,
-    recoveries_line,
-    reference_lines,
     unseen_in_all,
     unseen_line,
     warnings_first,
@@ -49,28 +47,31 @@ class RunLine:
 
 def run_html(c: Calibration) -> str:
     """The page of one run."""
+    verdict = run_verdict(c)
     return page(
         "run.html.j2",
         c=c,
-        verdict=run_verdict(c),
+        verdict=verdict,
+        advice=advice_on(c, verdict),
+        date=started(c),
         rows=(*parameter_rows(c.parameters), *effect_rows(c.effects)),
         drive=drive_line(c.drive),
         drawings=run_drawings(c),
-        fit=(
-            *_fit_facts(c.fit, c.outage),
-            *(("judged", line) for line in reference_lines(c.against_reference)),
-            ("unseen", unseen_line(c.unseen)),
-        ),
+        fit=fit_facts(c),
         noise=(*noise_facts(c.noise), ("clock", clock_line(c.clock))),
+        shown=shown_lines(c),
+        driven=driven_lines(c.manoeuvres),
+        origins=origin_lines(c.provenance) if c.provenance else (),
         notices=warnings_first(c.notices),
         origin=f"{c.origin_lat_deg:.7f}, {c.origin_lon_deg:.7f}",
         version=__version__,
-        variant=_variant(c.with_offset),
+        variant=variant(c.with_offset),
     )
 
 
 def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     """The page of several runs; it links to each run's own page, ``<run>/report.html``."""
+    verdict = vehicle_verdict(v)
     count = f"{len(v.runs)} run{'' if len(v.runs) == 1 else 's'}"
     time = duration(sum(c.drive.duration_s for c in v.runs))
     chi2 = v.consistency_chi2_per_dof
@@ -78,19 +79,20 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     return page(
         "vehicle.html.j2",
         v=v,
-        verdict=vehicle_verdict(v),
+        verdict=verdict,
+        advice=advice_on(v, verdict),
         rows=(*parameter_rows(v.parameters), *effect_rows(v.effects)),
         runs=[_run_line(c) for c in v.runs],
         total=f"{count} · {time} · {plain(sum(c.drive.distance_m for c in v.runs))} m",
         drawings=vehicle_drawings(v),
         fit=(
             ("runs", agreement),
-            *_fit_facts(v.fit, v.outage),
+            *fit_and_outage(v.fit, v.outage),
             ("unseen", unseen_line(unseen_in_all([c.unseen for c in v.runs]))),
         ),
         notices=warnings_first(v.notices),
         version=__version__,
-        variant=_variant(v.with_offset),
+        variant=variant(v.with_offset),
         json_link=json_link,
     )
 
@@ -104,17 +106,3 @@ def _run_line(c: Calibration) -> RunLine:
     drift = "–" if c.outage.end_rms_m is None else plain(c.outage.end_rms_m, 2)
     link = "./" + quote(c.run, errors="replace") + "/report.html"
     return RunLine(one_line(c.run), link, parameter_rows(c.parameters), drift, run_verdict(c))
-
-
-def _fit_facts(fit: Fit, outage: Outage) -> tuple[tuple[str, str], ...]:
-    return (
-        ("fixes", fixes_line(fit)),
-        ("heading", headings_line(fit)),
-        ("filter", recoveries_line(fit)),
-        ("outage", outage_line(outage)),
-        ("how", one_line(outage.how) if outage.windows else ""),
-    )
-
-
-def _variant(with_offset: bool) -> str:
-    return "SC EKF with offset estimation" if with_offset else "SC EKF"

@@ -22,6 +22,7 @@ from sccal.report.figures import (
     BLUE,
     GREY,
     ORANGE,
+    PAPER,
     POINTS,
     PURPLE,
     QUALITIES,
@@ -120,7 +121,7 @@ def fix_map(i: Inspection) -> str:
             every = strided(int(mask.sum()), POINTS)
             axes.plot(s.fix_east_m[mask][every], s.fix_north_m[mask][every], ".", ms=3.0, mew=0, color=colour)
             axes.plot([], [], "o", ms=5.0, mew=0, color=colour, label=label)
-        ends: dict[str, Any] = {"mec": "white", "mew": 0.8, "ls": "none", "zorder": 5}
+        ends: dict[str, Any] = {"mec": PAPER, "mew": 0.8, "ls": "none", "zorder": 5}
         axes.plot(s.fix_east_m[:1], s.fix_north_m[:1], "o", ms=8, color=BLUE, label="start", **ends)
         axes.plot(s.fix_east_m[-1:], s.fix_north_m[-1:], "s", ms=7, color=PURPLE, label="end", **ends)
         axes.set_aspect("equal", adjustable="datalim")

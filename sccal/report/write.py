@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from sccal.calibration.result import Calibration, VehicleCalibration
-from sccal.logs.write import write_text
+from sccal.logs.write import write_bytes, write_text
 from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.calibration_mcap import write_calibration_mcap
 from sccal.report.ros2_control import ros2_control_yaml
@@ -15,6 +15,7 @@ from sccal.report.trajectory import trajectory_csv, trajectory_tum
 from sccal.results.saved import RESULT_FILE, TRAJECTORY_FILE
 
 MCAP_FILE = "calibration.mcap"
+PDF_FILE = "report.pdf"
 
 
 def begin_loading() -> None:
@@ -31,8 +32,8 @@ def write_numbers(c: Calibration, folder: Path) -> None:
     write_text(folder / "ros2_control.yaml", ros2_control_yaml(c))
 
 
-def write_calibration(c: Calibration, folder: Path, with_mcap: bool = False) -> None:
-    """The five files of a run, and its calibration.mcap where that is wanted."""
+def write_calibration(c: Calibration, folder: Path, with_mcap: bool = False, with_pdf: bool = False) -> None:
+    """The five files of a run, and its calibration.mcap and report.pdf where they are wanted."""
     from sccal.report.html import run_html
 
     write_numbers(c, folder)
@@ -41,6 +42,12 @@ def write_calibration(c: Calibration, folder: Path, with_mcap: bool = False) -> 
         write_calibration_mcap(c, folder / MCAP_FILE)
     else:
         (folder / MCAP_FILE).unlink(missing_ok=True)
+    if with_pdf:
+        from sccal.report.pdf import run_pdf
+
+        write_bytes(folder / PDF_FILE, run_pdf(c))
+    else:
+        (folder / PDF_FILE).unlink(missing_ok=True)
 
 
 def write_vehicle(v: VehicleCalibration, out: Path, stem: str = "vehicle") -> None:

@@ -12,12 +12,15 @@ import pytest
 
 from sccal.calibration.result import (
     Calibration,
+    Cause,
     Clock,
+    Consistency,
     Drive,
     Estimate,
     Fit,
     Fixes,
     History,
+    Manoeuvre,
     Noise,
     Outage,
     OutageWindow,
@@ -53,6 +56,38 @@ def outage(windows: int = 8, window_s: float = 30.0) -> Outage:
     if not windows:
         return Outage(window_s, (), None, None, None, "no window")
     return Outage(window_s, tuple(every), 0.0612, 0.1187, 0.402, "the run before each window taught, the window judged")
+
+
+def causes(rng: np.random.Generator) -> tuple[Cause, ...]:
+    """One that stays on zero, and one that does not."""
+    x = rng.uniform(-0.8, 0.8, 900)
+    flat, bent = rng.normal(0.0, 0.003, (2, len(x)))
+    bent = bent + 0.01 * x
+    places = np.linspace(-0.75, 0.75, 16)
+    errors = np.full(16, 0.0004)
+    return (
+        Cause("heading", "turn_rate", x, flat, places, rng.normal(0.0, 0.0004, 16), errors, 0.4),
+        Cause("along", "speed", x, bent, places, 0.01 * places, errors, 1e-40),
+        Cause("across", "roll", x, flat, np.empty(0), np.empty(0), np.empty(0), math.nan),
+    )
+
+
+def consistency(duration_s: float, rng: np.random.Generator) -> tuple[Consistency, ...]:
+    t_s = START_S + duration_s * (np.arange(48) + 0.5) / 48.0
+    ones = np.ones(48)
+    nis = rng.normal(1.0, 0.2, 48)
+    return (
+        Consistency("fixes", t_s, nis, 0.6 * ones, 1.4 * ones, 0.951),
+        Consistency("headings", t_s, 9.0 * nis, 0.6 * ones, 1.4 * ones, 0.31),
+    )
+
+
+MANOEUVRES = (
+    Manoeuvre("straight", 101.5, 98.2, 0.3, (0.31, 1.52)),
+    Manoeuvre("arc_left", 93.0, 84.0, 17.9, (0.52, 1.11)),
+    Manoeuvre("spin_right", 12.0, 0.01, 9.1, (0.11, 0.25)),
+    Manoeuvre("standing", 12.0, 0.0, 0.0, (0.0, 0.01)),
+)
 
 
 def run(
@@ -124,6 +159,9 @@ def run(
         history=history,
         residuals=residuals,
         fixes=fixes,
+        causes=causes(rng),
+        consistency=consistency(duration_s, rng),
+        manoeuvres=MANOEUVRES,
         notices=(
             Notice("encoder.csv", "rows with text cells dropped", 3, "line 40"),
             Notice("gnss.nmea", "sentences with a wrong checksum dropped", 12, "line 1023", "warning"),

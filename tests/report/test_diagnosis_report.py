@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -37,8 +36,8 @@ from sccal.report.diagnosis_html import diagnosis_html
 from sccal.report.diagnosis_json import diagnosis_json
 from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, verdict_sentence
 from sccal.report.diagnosis_write import write_diagnosis
+from tests.report.pages import assert_page
 
-VOID = {"meta", "br", "link", "img", "hr", "input"}
 NAN = float("nan")
 JUDGED = {
     "outage_rms_m",
@@ -219,21 +218,6 @@ ALL = {
     "many runs": MANY_RUNS,
 }
 each = pytest.mark.parametrize("d", ALL.values(), ids=ALL.keys())
-
-
-class Balance(HTMLParser):
-    """Fails on tags that do not close in order."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
 
 
 def unwrapped(text: str) -> str:
@@ -466,18 +450,6 @@ def test_what_is_not_finite_is_null() -> None:
 
 
 # --- pages
-
-
-def assert_page(html: str) -> None:
-    balance = Balance()
-    balance.feed(html)
-    assert balance.open == []
-    for reference in re.findall(r'(?:src|href)="([^"]*)"', html):
-        assert not re.match(r"[a-z]+:|//", reference), f"{reference} is not in the page"
-    assert "<script" not in html
-    assert "@import" not in html
-    assert not re.search(r"url\((?!#)", html)
-    assert len(html.encode()) < 3_000_000
 
 
 @each

@@ -4,41 +4,29 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
 
-from sccal.calibration.result import Calibration, Fixes, History, Residuals, Trajectory, VehicleCalibration
-from sccal.report.figures import outage_drift, path_map, run_drawings, thinned
+from sccal.calibration.result import (
+    Calibration,
+    Estimate,
+    Fixes,
+    History,
+    InputFile,
+    Provenance,
+    Residuals,
+    Trajectory,
+    VehicleCalibration,
+)
+from sccal.report.advice import advice_on
+from sccal.report.figures import thinned
+from sccal.report.figures_outage import outage_plan
+from sccal.report.figures_run import run_drawings
 from sccal.report.html import run_html, vehicle_html
-
-VOID = {"meta", "br", "link", "img", "hr", "input"}
-
-
-class Balance(HTMLParser):
-    """Fails on tags that do not close in order."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-
-def assert_page(html: str) -> None:
-    balance = Balance()
-    balance.feed(html)
-    assert balance.open == []
-    for reference in re.findall(r'(?:src|href)="([^"]*)"', html):
-        assert not re.match(r"[a-z]+:|//", reference), f"{reference} is not in the page"
-    assert "<script" not in html
-    assert len(html.encode()) < 3_000_000
+from sccal.report.plan import drawn
+from sccal.report.verdict import run_verdict
+from tests.report.pages import assert_page
 
 
 def empty(c: Calibration) -> Calibration:
@@ -50,13 +38,16 @@ def empty(c: Calibration) -> Calibration:
         history=History(*[none] * 9),
         residuals=Residuals(none, none, none, nobody, none, none, none, none, none, nobody),
         fixes=Fixes(none, none, none, np.empty(0, dtype=np.int64)),
+        causes=(),
+        consistency=(),
+        manoeuvres=(),
     )
 
 
 def test_a_run_s_page(a_run: Calibration) -> None:
     html = run_html(a_run)
     assert_page(html)
-    assert html.count("<svg") == 4
+    assert html.count("<svg") == 6
     assert "0.080831 ± 0.000012 m" in html
     assert "drift after 30 s without fixes: 0.12 m rms" in html
 
@@ -64,7 +55,7 @@ def test_a_run_s_page(a_run: Calibration) -> None:
 def test_an_ugly_run_s_page_gives_reasons_and_no_empty_figure(an_ugly_run: Calibration) -> None:
     html = run_html(an_ugly_run)
     assert_page(html)
-    assert html.count("<svg") == 3
+    assert html.count("<svg") == 5
     assert "drive circles to both sides" in html
     assert "no window of 30 s fits" in html
 
@@ -114,12 +105,66 @@ def test_an_hour_s_figures_stay_small_and_well_formed(an_hour: Calibration) -> N
         ElementTree.fromstring(drawing.svg)
 
 
-def test_glyphs_keep_their_scale(an_ugly_run: Calibration) -> None:
-    assert "scale(0.015625)" in path_map(an_ugly_run)
+def test_figures_keep_the_decimals_of_their_text(a_run: Calibration, a_vehicle: VehicleCalibration) -> None:
+    drift = next(drawing.svg for drawing in run_drawings(a_run) if drawing.name == "outage")
+    assert "rms at the end: 0.12 m" in drift
+    ticks = re.findall(r">(0\.0\d+)</text>", vehicle_html(a_vehicle))
+    assert any(len(tick) > len("0.00") for tick in ticks)
+
+
+def test_provenance_stands_on_the_page_where_it_is_known(a_run: Calibration) -> None:
+    assert "Provenance" not in run_html(a_run)
+    digest = "0123456789abcdef" * 4
+    made = Provenance(
+        (InputFile("encoder.csv", 123456, digest),), {"outage_window_s": "30"}, {"sccal": "0.1.0", "numpy": "2.0"}
+    )
+    html = run_html(replace(a_run, provenance=made, started_utc_s=1780000000.0))
+    assert_page(html)
+    for told in (digest, "123456", "outage_window_s = 30", "numpy 2.0", "2026-05-28 20:26 UTC"):
+        assert told in html
+
+
+def test_the_page_says_what_was_not_driven(a_run: Calibration) -> None:
+    html = run_html(a_run)
+    for kind in ("straight back", "arcs to the right", "turns in place, left"):
+        assert re.search(rf'{kind}</th><td class="n" data-label="time">none<', html)
+    assert re.search(r'arcs to the left</th><td class="n" data-label="time">93 s<', html)
+
+
+def test_a_residual_that_follows_something_is_named(a_run: Calibration) -> None:
+    svg = next(drawing.svg for drawing in run_drawings(a_run) if drawing.name == "causes")
+    assert svg.count("up to 0.0075 m") == 1
+    assert "up to" not in svg.replace("up to 0.0075 m", "")
+
+
+def test_a_run_of_which_nothing_may_be_used_is_called_unusable(a_run: Calibration) -> None:
+    def unseen(one: Estimate) -> Estimate:
+        return replace(one, status="unobserved", reason="drive circles")
+
+    p = a_run.parameters
+    none = replace(
+        p,
+        radius_right_m=unseen(p.radius_right_m),
+        radius_left_m=unseen(p.radius_left_m),
+        track_m=unseen(p.track_m),
+        heading_offset_rad=unseen(p.heading_offset_rad),
+    )
+    bad = replace(a_run, parameters=none)
+    assert advice_on(bad, run_verdict(bad)).level == "unusable"
+    assert run_verdict(bad).level == "doubtful"
+    assert "drive circles" in advice_on(bad, run_verdict(bad)).next_step
+    some = replace(a_run, parameters=replace(p, track_m=unseen(p.track_m)))
+    advice = advice_on(some, run_verdict(some))
+    assert advice.level == "partial"
+    assert "use right radius, left radius and heading offset, not track" in advice.title
+    assert advice_on(a_run, run_verdict(a_run)).level == "good"
+    assert "subtract the heading offset" in advice_on(a_run, run_verdict(a_run)).next_step
+    without = replace(a_run, with_offset=False, parameters=replace(p, heading_offset_rad=unseen(p.heading_offset_rad)))
+    assert "heading offset" not in advice_on(without, run_verdict(without)).next_step
 
 
 def test_an_outage_without_windows_can_be_drawn(an_ugly_run: Calibration) -> None:
-    ElementTree.fromstring(outage_drift(an_ugly_run.outage))
+    ElementTree.fromstring(drawn(outage_plan(an_ugly_run.outage)).svg)
 
 
 def test_thinning_keeps_extremes_and_ends() -> None:
