@@ -1,7 +1,8 @@
 """What is left of heading and fixes, against what the robot did: a residual that follows a quantity has a cause there.
 
-The quantities are taken from the wheels and, for directions only, from the AHRS: a turn rate by the AHRS would hold the
-very errors whose cause is sought.
+A quantity must not hold the very error whose cause is sought: sorted by a noisy yaw, its own noise looks like a cause.
+The heading is therefore the one that was predicted before the reading, which its innovation does not depend on, and
+speed and turn rate are taken from the wheels just after the measurement, which they had no part in predicting.
 """
 
 from __future__ import annotations
@@ -17,11 +18,16 @@ from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import RunProblem
 
 BINS = 16
-FEWEST_IN_BIN = 10
+FEWEST_IN_BIN = 20
 SPAN_S = 0.5
-"""Speeds and turn rates are means over so long, around the measurement."""
+"""Speeds and turn rates are means over so long …"""
+PAUSE_S = 0.1
+"""… beginning so long after the measurement: a count's rounding is still in the one before."""
 LEAST_TILT_RAD = np.radians(2.0)
 """Roll and pitch whose middle nine tenths span less tell nothing."""
+SHIFTS = 8
+NEAR_EDGE = 0.1
+"""Of a bin's width."""
 OUTER = 0.005
 """Share of the measurements at either end of a quantity's range that the bins leave out."""
 
@@ -32,7 +38,7 @@ def find_causes(problem: RunProblem, found: ForwardPass, values: Floats, settled
     heading_t = aligned.heading_t_s[timeline.heading_index]
     kept = found.heading_accepted & (heading_t >= settled_s)
     t_s, heading = heading_t[kept], found.heading_nu_rad[kept]
-    yaw = _wrapped(aligned.yaw_rad[timeline.heading_index][kept] - values[3])
+    yaw = _wrapped(aligned.yaw_rad[timeline.heading_index][kept] - heading - values[3])
     speed, turn_rate = _motion(problem, values, t_s)
     causes = [
         binned("heading", "yaw", yaw, heading),
@@ -76,24 +82,41 @@ def binned(
     x, residuals = x[known], residuals[known]
     if not x.size:
         return Cause(residual, quantity, x, residuals, x, x, x, float("nan"))
-    low, high = np.quantile(x, (OUTER, 1.0 - OUTER))
+    low, high = (-np.pi, np.pi) if quantity == "yaw" else np.quantile(x, (OUTER, 1.0 - OUTER))
     width = (high - low) / BINS
     inside = (x >= low) & (x <= high)
-    place = np.minimum((x[inside] - low) / (width or 1.0), BINS - 1).astype(np.int64)
+    scaled = (x[inside] - low) / (width or 1.0)
+    shift = _off_the_crowds(scaled)
+    place = np.floor(scaled + shift).astype(np.int64)
+    places = BINS + 1
+    if quantity == "yaw":
+        places = BINS
+        place %= BINS  # west is one place, wherever its angle is cut
+    place = np.minimum(place, places - 1)
     some = residuals[inside]
-    count = np.bincount(place, minlength=BINS)
+    count = np.bincount(place, minlength=places)
     enough = count >= FEWEST_IN_BIN
     n = count[enough]
-    mean = np.bincount(place, some, BINS)[enough] / n
-    square = np.bincount(place, some**2, BINS)[enough] / n
-    whole = np.zeros(BINS)
+    mean = np.bincount(place, some, places)[enough] / n
+    square = np.bincount(place, some**2, places)[enough] / n
+    whole = np.zeros(places)
     whole[enough] = mean
     sigma = np.sqrt(np.maximum(square - mean**2, 0.0) / (n - 1) * _in_a_row(some - whole[place]))
-    middle = (low + width * (np.arange(BINS) + 0.5))[enough]
+    middle = (low + width * (np.arange(places) + 0.5 - shift))[enough]
     told = sigma > 0.0
     chi2 = float(np.sum((mean[told] / sigma[told]) ** 2))
     chance = float(gammaincc(0.5 * told.sum(), 0.5 * chi2)) if told.any() else float("nan")
     return Cause(residual, quantity, x, residuals, middle, mean, sigma, chance)
+
+
+def _off_the_crowds(scaled: Floats) -> float:
+    """How far to move edges at whole numbers to the left so that few values (n,) stand at one.
+
+    A robot drives for long at one heading or speed. An edge there would sort its measurements by their noise.
+    """
+    shifts = np.arange(SHIFTS) / SHIFTS
+    near = [float(np.sum(np.abs(scaled + shift - np.round(scaled + shift)) < NEAR_EDGE)) for shift in shifts]
+    return float(shifts[int(np.argmin(near))])
 
 
 def _in_a_row(left: Floats) -> float:
@@ -101,6 +124,8 @@ def _in_a_row(left: Floats) -> float:
 
     Geyer's initial positive sequence (Practical Markov chain Monte Carlo, Statistical Science 1992).
     """
+    if left.size < 2:
+        return 1.0
     size = 1 << (2 * left.size - 1).bit_length()
     spectrum = np.fft.rfft(left - left.mean(), size)
     covariance = np.fft.irfft(np.abs(spectrum) ** 2, size)[: left.size]
@@ -114,11 +139,11 @@ def _in_a_row(left: Floats) -> float:
 
 
 def _motion(problem: RunProblem, values: Floats, t_s: Floats) -> tuple[Floats, Floats]:
-    """Speed (m/s) and turn rate (rad/s) by the wheels at times (n,), with the radii and the track as found."""
+    """Speed (m/s) and turn rate (rad/s) by the wheels after times (n,), with the radii and the track as found."""
     aligned = problem.aligned
     first, last = aligned.span_s
-    before = np.clip(t_s - 0.5 * SPAN_S, first, last)
-    after = np.clip(t_s + 0.5 * SPAN_S, first, last)
+    before = np.clip(t_s + PAUSE_S, first, last)
+    after = np.clip(t_s + PAUSE_S + SPAN_S, first, last)
     rims = [
         radius * (np.interp(after, aligned.wheel_t_s, angle) - np.interp(before, aligned.wheel_t_s, angle))
         for radius, angle in zip(values[:2], (aligned.right_rad, aligned.left_rad), strict=True)

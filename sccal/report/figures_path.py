@@ -120,14 +120,15 @@ def _begin_marks(panel: Panel, c: Calibration) -> None:
 
 
 def _scale_and_north(sheet: Sheet, panel: Panel) -> None:
+    """Beside the map, where no path can cross them."""
     left, bottom, width, height = panel.box
     span = panel.x[1] - panel.x[0]
     length = float(ticks(0.0, 0.3 * span, 1)[-1]) or 0.2 * span
     points = length / span * width
-    right, y = left + width - 8.0, bottom + 10.0
+    right, y = left + width, 6.0
     ends = [(right - points, y + 3.0), (right - points, y), (right, y), (right, y + 3.0)]
     sheet.path(np.array(ends), stroke=INK, width=1.3)
-    sheet.text(right - 0.5 * points, y + 5.0, f"{labels(np.array([length]))[0]} m", SMALL, INK, "center")
-    x, y = left + width - 12.0, bottom + height - 30.0
-    sheet.path(np.array([(x, y + 16.0), (x - 4.5, y), (x, y + 4.0), (x + 4.5, y), (x, y + 16.0)]), fill=INK)
-    sheet.text(x, y + 18.0, "N", SIZE, INK, "center", bold=True)
+    sheet.text(right - points - 4.0, y - 1.5, f"{labels(np.array([length]))[0]} m", SMALL, INK, "right")
+    x, y = right - 5.0, bottom + height + 3.0
+    sheet.path(np.array([(x, y + 13.0), (x - 4.0, y), (x, y + 3.0), (x + 4.0, y), (x, y + 13.0)]), fill=INK)
+    sheet.text(x - 8.0, y + 2.0, "N", SIZE, INK, "right", bold=True)

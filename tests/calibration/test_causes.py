@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from sccal.calibration.causes import BINS, FEWEST_IN_BIN, binned, find_causes
+from sccal.calibration.causes import BINS, FEWEST_IN_BIN, NEAR_EDGE, SHIFTS, binned, find_causes
 from sccal.calibration.consistency import STRETCHES, in_stretches
 from sccal.calibration.manoeuvres import describe_manoeuvres
 from sccal.calibration.options import CalibrationOptions
@@ -22,17 +22,37 @@ from tests.runs import read, written
 VALUES = np.array([0.1, 0.1, 0.8, 0.0])
 
 
-@given(st.integers(0, 10_000), st.integers(1, 400))
+def near_an_edge(values: np.ndarray, first: float, width: float) -> int:
+    """How many lie within a tenth of a bin of an edge."""
+    return sum(abs((value - first) / width - round((value - first) / width)) < NEAR_EDGE for value in values)
+
+
+@pytest.mark.parametrize("legs_deg", [(0.0, 90.0, 180.0, 270.0), (11.25, 101.25), (180.0,)])
+def test_noise_about_a_heading_is_not_sorted_into_a_trend(legs_deg: tuple[float, ...]) -> None:
+    """What was predicted is off by an error that the residual holds with the opposite sign."""
+    rng = np.random.default_rng(6)
+    leg = np.radians(rng.choice(legs_deg, 4000))
+    error = rng.normal(0.0, 0.005, leg.size)
+    residuals = rng.normal(0.0, 0.003, leg.size) - error
+    x = np.pi - (np.pi - leg - error) % (2.0 * np.pi)
+    assert binned("heading", "yaw", x, residuals).chance > 1e-3
+    assert binned("heading", "yaw", x, residuals + 0.002 * np.cos(leg)).chance < 1e-6
+
+
+@given(st.integers(0, 10_000), st.integers(2, 400))
 @settings(max_examples=40, deadline=None)
 def test_means_are_those_of_a_loop(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     x, y = rng.normal(size=count), rng.normal(size=count)
     found = binned("along", "speed", x, y)
     low, high = np.quantile(x, (0.005, 0.995))
-    edges = np.linspace(low, high, BINS + 1)
+    width = (high - low) / BINS
+    crowds = [near_an_edge(x[(x >= low) & (x <= high)], low - width * k / SHIFTS, width) for k in range(SHIFTS)]
+    edges = low + width * (np.arange(BINS + 2) - np.argmin(crowds) / SHIFTS)
+    inside = (x >= low) & (x <= high)
     expected = []
     for a, b in pairwise(edges):
-        some = y[(x >= a) & ((x < b) | ((b == edges[-1]) & (x <= high)))]
+        some = y[inside & (x >= a) & ((x < b) | (b == edges[-1]))]
         if some.size >= FEWEST_IN_BIN:
             expected.append((0.5 * (a + b), some.mean(), some.std(ddof=1) / np.sqrt(some.size)))
     got = np.column_stack((found.bin_x, found.bin_mean, found.bin_sigma))
@@ -97,7 +117,7 @@ def test_directions_and_signs(solved) -> None:
         found,
         fix_nu_m=np.column_stack((nu.real, nu.imag)),
         fix_accepted=np.ones_like(found.fix_accepted),
-        heading_nu_rad=np.sin(problem.aligned.yaw_rad[problem.timeline.heading_index] - values[3]),
+        heading_nu_rad=0.01 * np.sin(problem.aligned.yaw_rad[problem.timeline.heading_index] - values[3]),
         heading_accepted=np.ones_like(found.heading_accepted),
     )
     causes = {(one.residual, one.quantity): one for one in find_causes(problem, made, values, t_s[0] + 20.0)}
@@ -105,7 +125,7 @@ def test_directions_and_signs(solved) -> None:
     assert np.polyfit(along.x, along.residuals, 1)[0] == pytest.approx(0.02, rel=0.1)
     assert np.polyfit(across.x, across.residuals, 1)[0] == pytest.approx(0.5, rel=0.1)
     heading = causes["heading", "yaw"]
-    np.testing.assert_allclose(heading.residuals, np.sin(heading.x), atol=1e-9)
+    np.testing.assert_allclose(heading.residuals, 0.01 * np.sin(heading.x), atol=1.1e-4)
     assert np.abs(heading.x).max() <= np.pi
     assert along.chance < 1e-6
     assert across.chance < 1e-6
@@ -119,7 +139,7 @@ def test_a_good_model_leaves_nothing_that_follows(solved) -> None:
         ("along", "speed"),
         ("across", "turn_rate"),
     }
-    assert all(one.chance > 1e-6 for one in calibration.causes)
+    assert all(one.chance > 1e-4 for one in calibration.causes)
     assert {one.measured for one in calibration.consistency} == {"fixes", "headings"}
     for one in calibration.consistency:
         assert 0.9 < one.inside < 0.99
