@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.progress import progress_on
+from sccal.cli.reading import PathsOrUrls, local_or_url, with_read_options
 from sccal.cli.telling import columns, tell_failures
 from sccal.errors import SccalError
 
 if TYPE_CHECKING:
+    from sccal.batch.tasks import Source
     from sccal.calibration.result import Calibration
     from sccal.logs.options import ReadOptions
-    from sccal.logs.run import RunSource
 
 
 @app.command()
 @with_read_options
 def calibrate(
-    paths: Paths,
+    paths: PathsOrUrls,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
     no_offset: Annotated[
         bool, typer.Option("--no-offset", help="The paper's SC EKF: no heading-offset state, the AHRS is true.")
@@ -52,13 +54,24 @@ def calibrate(
     mcap: Annotated[
         bool, typer.Option("--mcap", help="Write calibration.mcap too: the results as messages beside the log's.")
     ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(help="Runs at a time; by default one on each core.", min=1, show_default=False)
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Skip runs whose results stand in OUT, from the same inputs and options.")
+    ] = False,
+    scheduler: Annotated[str, typer.Option(help="Work on this Dask cluster instead, tcp://host:8786.")] = "",
     *,
     read: ReadOptions,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
+    from sccal.cli.crew import crew_for, one_thread_each
     from sccal.logs.mcap_magic import require_any_mcap
 
-    require_any_mcap(paths)
+    given = [local_or_url(path) for path in paths]
+    require_any_mcap([path for path in given if isinstance(path, Path)])
+    one_thread_each()
+    crew = crew_for(given, jobs, scheduler)
     import numpy as np
 
     from sccal.batch import calibrate_paths
@@ -84,7 +97,13 @@ def calibrate(
         effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
         withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
-    batch = calibrate_paths(paths, out, options, _tell, read, mcap)
+    try:
+        with progress_on(sys.stdout) as progress:
+            batch = calibrate_paths(given, out, options, _tell, read, mcap, crew=crew, resume=resume, progress=progress)
+    finally:
+        crew.close()
+    if batch.unchanged:
+        print(f"{batch.unchanged} of {len(batch.calibrated)} results stood already and were not made again")
     width = columns()
     for vehicle, file in batch.vehicles:
         print()
@@ -95,7 +114,7 @@ def calibrate(
     tell_failures(batch.failures, len(batch.failures) + len(batch.calibrated))
 
 
-def _tell(source: RunSource, result: Calibration | SccalError) -> None:
+def _tell(source: Source, result: Calibration | SccalError) -> None:
     if isinstance(result, SccalError):
         print(f"{source.name}: no result", flush=True)
     else:
