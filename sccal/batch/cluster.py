@@ -50,7 +50,7 @@ class Cluster:
         futures = {
             self._client.submit(_done, task, pure=False, retries=RETRIES): place for place, task in enumerate(tasks)
         }
-        for future in self._distributed.as_completed(list(futures)):
+        for future in self._distributed.as_completed(list(futures), loop=self._client.loop):
             place = futures.pop(future)
             try:
                 result = future.result()
