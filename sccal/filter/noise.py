@@ -254,7 +254,7 @@ class _Likelihood:
 @contextmanager
 def at_once() -> Iterator[Callable[[Callable[[Floats], float], list[Floats]], Iterable[float]]]:
     """A ``map`` whose calls share the cores that this process may use; in processes of their own they have one."""
-    cores = min(int(numba.config.NUMBA_NUM_THREADS), 4)
+    cores = min(numba.get_num_threads(), 4)
     if cores < 2:
         yield map
         return
