@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import multiprocessing
 import os
@@ -161,6 +162,9 @@ def _serve(connection: Connection) -> None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
     importlib.import_module("sccal.batch.tasks")
     importlib.import_module("sccal.report.html")
+    # What is loaded stays; looking through it again and again for garbage costs a tenth of the work.
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         while True:
             connection.send(connection.recv()())
