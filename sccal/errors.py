@@ -19,6 +19,7 @@ class Exit(IntEnum):
     DATA = 3
     INTERNAL = 4
     NOTHING_MATCHED = 5
+    INTERRUPTED = 130
 
 
 _LONGEST_MESSAGE = 3000
@@ -56,6 +57,12 @@ class NothingMatchedError(SccalError):
     """A pattern or filter selected nothing."""
 
     exit_code = Exit.NOTHING_MATCHED
+
+
+class Interrupted(SccalError):  # noqa: N818 (nothing went wrong)
+    """The user stopped it; the message says what is done and how to go on."""
+
+    exit_code = Exit.INTERRUPTED
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 import yaml
 
+from sccal.batch.record import RECORD_FILE
 from sccal.cli import main
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -149,7 +150,7 @@ def backwards(stamps: list[str], begin_s: float, length_s: float = 5.0) -> list[
 
 
 def test_every_result_is_there_and_can_be_read(results: Path) -> None:
-    assert sorted(path.name for path in results.iterdir()) == sorted(RESULTS)
+    assert sorted(path.name for path in results.iterdir()) == sorted([RECORD_FILE, *RESULTS])
     found = strict_json(results / "calibration.json")
     assert found["schema"] == "sccal.calibration/1"
     assert tuple(found["parameters"]) == PARAMETERS
@@ -505,7 +506,7 @@ def test_bad_runs_do_not_stop_the_good_ones(good: Path, results: Path, tmp_path:
 
     assert sorted(path.name for path in out.iterdir() if path.is_dir()) == ["a_good", "z_good"]
     for name in ("a_good", "z_good"):
-        assert sorted(path.name for path in (out / name).iterdir()) == sorted(RESULTS)
+        assert sorted(path.name for path in (out / name).iterdir()) == sorted([RECORD_FILE, *RESULTS])
         assert strict_json(out / name / "calibration.json")["run"] == name
     alone, together = (strict_json(path / "calibration.json") for path in (results, out / "a_good"))
     assert together["parameters"] == alone["parameters"]

@@ -83,26 +83,32 @@ def _segments(x: Floats, d: Floats, level2: float, penalty: float, longest: int)
         cd[i + 1] = cd[i] + d[i]
     best = np.zeros(n + 1)
     came_from = np.zeros(n + 1, dtype=np.int64)
+    costs = np.empty(longest)
     for end in range(1, n + 1):
-        best[end] = np.inf
-        for begin in range(max(0, end - longest), end):
-            sum_x = cx[end] - cx[begin]
-            cost = best[begin] - sum_x * sum_x / (level2 * (cd[end] - cd[begin])) + penalty
-            if cost < best[end]:
-                best[end] = cost
-                came_from[end] = begin
+        begin = max(0, end - longest)
+        before, from_x, from_d = best[begin:end], cx[begin:end], cd[begin:end]
+        # A loop of its own without branches, so that several are computed at once.
+        for k in range(end - begin):
+            sum_x = cx[end] - from_x[k]
+            costs[k] = before[k] - sum_x * sum_x / (level2 * (cd[end] - from_d[k])) + penalty
+        least, first = costs[0], 0
+        for k in range(1, end - begin):
+            if costs[k] < least:
+                least, first = costs[k], k
+        best[end] = least
+        came_from[end] = begin + first
     count = 0
     at = n
     while at > 0:
         at = came_from[at]
         count += 1
-    first = np.empty(count, dtype=np.int64)
+    starts = np.empty(count, dtype=np.int64)
     at = n
     while at > 0:
         at = came_from[at]
         count -= 1
-        first[count] = at
-    return first
+        starts[count] = at
+    return starts
 
 
 @compiled

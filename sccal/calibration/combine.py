@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from sccal.calibration.outage import summarise
 from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 from sccal.calibration.status import judge
 from sccal.filter.iterate import At, RunProblem
+from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.logs.streams import Notice
 
@@ -22,22 +24,55 @@ OFFSET_OF_THE_RUN_RAD = np.radians(5.0)
 def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> VehicleCalibration:
     """One result for all runs of a vehicle; runs and problems belong together, one or more."""
     first = problems[0]
-    vehicle, options = first.aligned.vehicle, first.options
     if len(runs) == 1:
-        only = runs[0]
-        return VehicleCalibration(
-            vehicle, only.with_offset, (only,), only.parameters, only.fit, only.outage, None, effects=only.effects
-        )
+        return only_run(runs[0])
     shared = shared_places(first)
     own = [_own_values(run, problem) for run, problem in zip(runs, problems, strict=True)]
     fit = fit_jointly(problems, [At(Constants.of(theta), theta[3:]) for theta in own])
-    at, covariance, chi2_per_dof = fit.mode, fit.robust, fit.chi2_per_dof
+    effects = _shared_effects(first, shared, fit.mode, fit.robust)
+    return combined(runs, first.options, fit, effects)
+
+
+def only_run(run: Calibration) -> VehicleCalibration:
+    """The vehicle's result where there is one run."""
+    return VehicleCalibration(
+        run.vehicle, run.with_offset, (run,), run.parameters, run.fit, run.outage, None, effects=run.effects
+    )
+
+
+class Answer(Protocol):
+    """A joint fit's answer for the k shared parameters, R_r, R_l and L first."""
+
+    @property
+    def mode(self) -> Floats:
+        """(k,)"""
+        ...
+
+    @property
+    def robust(self) -> Floats:
+        """(k, k) covariance with every sigma at least the runs' scatter."""
+        ...
+
+    @property
+    def chi2_per_dof(self) -> float | None:
+        """Disagreement of the runs."""
+        ...
+
+
+def combined(
+    runs: Sequence[Calibration],
+    options: FilterOptions,
+    fit: Answer,
+    effects: Mapping[str, Mapping[str, Estimate]] | None = None,
+) -> VehicleCalibration:
+    """One result for two or more runs, given the joint answer; of the runs no array over time is needed."""
+    vehicle, chi2_per_dof = runs[0].vehicle, fit.chi2_per_dof
     offset, notices = _combined_offset(runs)
     full = np.zeros((4, 4))
-    full[:3, :3] = covariance[:3, :3]
+    full[:3, :3] = fit.robust[:3, :3]
     full[3, 3] = offset.sigma**2
     parameters = judge(
-        np.append(at[:3], offset.value), full, vehicle, options, pooled_drive([run.drive for run in runs])
+        np.append(fit.mode[:3], offset.value), full, vehicle, options, pooled_drive([run.drive for run in runs])
     )
     if chi2_per_dof is not None and chi2_per_dof > INCONSISTENT:
         what = (
@@ -59,7 +94,7 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
         ),
         consistency_chi2_per_dof=chi2_per_dof,
         notices=tuple(notices),
-        effects=_shared_effects(first, shared, at, covariance),
+        effects=effects or {},
     )
 
 

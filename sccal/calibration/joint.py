@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import Protocol, TypeGuard
 
 import numpy as np
 
@@ -25,6 +25,20 @@ from sccal.filter.start import Constants
 
 MAX_ROUNDS = 4
 CLOSE_SIGMAS = 0.05
+
+
+class Gaussian(Protocol):
+    """What a run says of k shared parameters."""
+
+    @property
+    def precision(self) -> Floats:
+        """(k, k)"""
+        ...
+
+    @property
+    def vector(self) -> Floats:
+        """(k,) precision times the best values."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -135,11 +149,11 @@ def fit_jointly(problems: Sequence[RunProblem], first: Sequence[At], max_rounds:
             break
     robust = covariance
     if len(problems) > 1:
-        robust = at_least(covariance, _between_runs(likelihoods, at, covariance))
-    return JointFit(at, covariance, robust, tuple(own), tuple(likelihoods), _consistency(likelihoods, at, prior))
+        robust = at_least(covariance, between_runs(likelihoods, at, covariance))
+    return JointFit(at, covariance, robust, tuple(own), tuple(likelihoods), disagreement(likelihoods, at, prior))
 
 
-def _consistency(likelihoods: Sequence[RunLikelihood], at: Floats, prior: Floats) -> float | None:
+def disagreement(likelihoods: Sequence[Gaussian], at: Floats, prior: Floats) -> float | None:
     """χ² of the runs' own answers around the joint one, per degree of freedom, over the directions they observe."""
     chi2, directions = 0.0, 0
     scale = np.sqrt(np.diag(prior))
@@ -153,7 +167,7 @@ def _consistency(likelihoods: Sequence[RunLikelihood], at: Floats, prior: Floats
     return chi2 / dof if dof > 0 and len(likelihoods) > 1 else None
 
 
-def _between_runs(likelihoods: Sequence[RunLikelihood], at: Floats, covariance: Floats) -> Floats:
+def between_runs(likelihoods: Sequence[Gaussian], at: Floats, covariance: Floats) -> Floats:
     """Covariance from the scatter of the runs' scores."""
     scores = np.array([one.vector - one.precision @ at for one in likelihoods])
     count = len(likelihoods)

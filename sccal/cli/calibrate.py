@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.progress import progress_on
+from sccal.cli.reading import PathsOrUrls, local_or_url, with_read_options
 from sccal.cli.telling import columns, tell_failures
 from sccal.errors import SccalError
 
 if TYPE_CHECKING:
+    from sccal.batch import Batch, Progress
+    from sccal.batch.tasks import Source
     from sccal.calibration.result import Calibration
+    from sccal.gates.result import BatchOutcome
     from sccal.logs.options import ReadOptions
-    from sccal.logs.run import RunSource
 
 
 @app.command()
 @with_read_options
 def calibrate(
-    paths: Paths,
+    paths: PathsOrUrls,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
     no_offset: Annotated[
         bool, typer.Option("--no-offset", help="The paper's SC EKF: no heading-offset state, the AHRS is true.")
@@ -53,20 +58,48 @@ def calibrate(
         bool, typer.Option("--mcap", help="Write calibration.mcap too: the results as messages beside the log's.")
     ] = False,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too: the page on A4.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(help="Runs at a time; by default one on each core.", min=1, show_default=False)
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Skip runs whose results stand in OUT, from the same inputs and options.")
+    ] = False,
+    scheduler: Annotated[str, typer.Option(help="Work on this Dask cluster instead, tcp://host:8786.")] = "",
+    gate: Annotated[
+        list[str] | None,
+        typer.Option(help='Fail with exit code 1 unless, e.g. "outage.percent_of_distance<0.5" (repeatable).'),
+    ] = None,
+    baseline: Annotated[
+        Path | None,
+        typer.Option(help="Compare with this calibration.json, vehicle.json or summary.json.", show_default=False),
+    ] = None,
+    allow_drift: Annotated[
+        list[str] | None,
+        typer.Option(help="How far from the baseline: 2sigma, 1%, 0.5mm, 0.2deg (repeatable; 3sigma without it)."),
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML for CI servers.", show_default=False)] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
     *,
     read: ReadOptions,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
+    from sccal.cli.crew import crew_for, one_thread_each
     from sccal.logs.first_look import require_any_log
 
-    require_any_log(paths)
+    given = [local_or_url(path) for path in paths]
+    local = [path for path in given if isinstance(path, Path)]
+    if len(local) == len(given):
+        require_any_log(local)
+    estimated = tuple(name.strip() for name in effects.split(",") if name.strip())
+    one_thread_each()
+    crew = crew_for(given, jobs, scheduler)
     import numpy as np
 
-    from sccal.batch import calibrate_paths
+    from sccal.batch import AlsoWritten, calibrate_paths, judged, write_outcome
     from sccal.calibration.options import CalibrationOptions
     from sccal.filter.options import FilterOptions
+    from sccal.gates.asked import read_asked
     from sccal.logs.windows import parse_window
-    from sccal.report.text import run_text, vehicle_text
 
     options = CalibrationOptions(
         filter=FilterOptions(
@@ -82,24 +115,87 @@ def calibrate(
         outage_window_s=window,
         output_rate_hz=rate,
         heading_rate_hz=heading_rate,
-        effects=tuple(name.strip() for name in effects.split(",") if name.strip()),
+        effects=estimated,
         withhold_s=tuple(parse_window(text) for text in withhold or []),
     )
-    batch = calibrate_paths(paths, out, options, _tell, read, mcap, pdf)
-    width = columns()
+    lines = sys.stderr if as_json else sys.stdout
+    try:
+        asked = read_asked(gate or [], baseline, allow_drift or [], estimated)
+        with progress_on(lines) as bar, redirect_stdout(lines):
+            teller = _Teller(bar)
+            batch = calibrate_paths(
+                given,
+                out,
+                options,
+                teller.tell,
+                read,
+                AlsoWritten(mcap=mcap, pdf=pdf),
+                crew=crew,
+                resume=resume,
+                progress=teller,
+            )
+    finally:
+        crew.close()
+    outcome = judged(batch, asked)
+    index = write_outcome(outcome, out, junit)
+    with redirect_stdout(lines):
+        _tell_batch(batch, out, index)
+        _tell_gates(outcome)
+    if as_json:
+        from sccal.report.as_json import json_text
+        from sccal.report.batch_json import batch_json
+
+        print(json_text(batch_json(outcome)), end="")
+    with redirect_stdout(lines):
+        tell_failures(batch.failures, len(batch.failures) + len(batch.calibrated))
+    raise typer.Exit(int(outcome.exit_code))
+
+
+class _Teller:
+    """A line for each run as the runs come, beside the bar if there is one."""
+
+    def __init__(self, bar: Progress | None) -> None:
+        self._bar = bar
+        self._runs = 0
+
+    def found(self, runs: int) -> None:
+        self._runs = runs
+        if self._bar is not None:
+            self._bar.found(runs)
+
+    def done(self) -> None:
+        if self._bar is not None:
+            self._bar.done()
+
+    def tell(self, source: Source, result: Calibration | SccalError) -> None:
+        if isinstance(result, SccalError):
+            if self._runs > 1:  # of one run alone, why says all
+                print(f"{source.name}: no result", flush=True)
+        else:
+            from sccal.report.verdict import run_verdict
+
+            print(f"{source.name}: {run_verdict(result)}", flush=True)
+
+
+def _tell_batch(batch: Batch, out: Path, index: Path | None) -> None:
+    from sccal.report.text import run_text, vehicle_text
+
+    if batch.unchanged:
+        print(f"{batch.unchanged} of {len(batch.calibrated)} results stood already and were not made again")
     for vehicle, file in batch.vehicles:
         print()
-        print(vehicle_text(vehicle, width) if len(vehicle.runs) > 1 else run_text(vehicle.runs[0], width), end="")
+        alone = len(vehicle.runs) == 1
+        print(run_text(vehicle.runs[0], columns()) if alone else vehicle_text(vehicle, columns()), end="")
         print()
-        page = out / vehicle.runs[0].run / "report.html" if len(vehicle.runs) == 1 else file.with_suffix(".html")
+        page = out / vehicle.runs[0].run / "report.html" if alone else file.with_suffix(".html")
         print(f"results in {out}/, report: {page}")
-    tell_failures(batch.failures, len(batch.failures) + len(batch.calibrated))
+    if index is not None and len(batch.calibrated) + len(batch.failures) > 1:
+        print(f"all runs: {index}")
 
 
-def _tell(source: RunSource, result: Calibration | SccalError) -> None:
-    if isinstance(result, SccalError):
-        print(f"{source.name}: no result", flush=True)
-    else:
-        from sccal.report.verdict import run_verdict
+def _tell_gates(outcome: BatchOutcome) -> None:
+    from sccal.report.gates_text import gates_text
 
-        print(f"{source.name}: {run_verdict(result)}", flush=True)
+    text = gates_text(outcome.gates, columns())
+    if text:
+        print(f"\n{text}", end="")

@@ -33,6 +33,16 @@ _READ_CHOICES = {"time": ("header", "log", "publish"), "orientation": ("enu", "n
 
 Paths = Annotated[list[Path], typer.Argument(help="Runs, or folders of runs at any depth.", show_default=False)]
 
+PathsOrUrls = Annotated[
+    list[str],
+    typer.Argument(help="Runs, folders of runs at any depth, or URLs as s3://bucket/logs/**.", show_default=False),
+]
+
+
+def local_or_url(text: str) -> Path | str:
+    """An argument as a path, but for a URL: its slashes would not survive."""
+    return text if "://" in text else Path(text)
+
 
 def with_read_options(command: Callable[..., None]) -> Callable[..., None]:
     """The command with an option for each field of ReadOptions, which it gets together as ``read``."""

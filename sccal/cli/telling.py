@@ -15,7 +15,8 @@ def tell_failures(failures: Sequence[Failure], total: int) -> None:
     """A line for every run that gave nothing, and the exit code of the worst."""
     if not failures:
         return
-    print()
+    if total > 1:
+        print()
     for failure in failures:
         print(f"sccal: {failure.name}: {failure.error}", file=sys.stderr)
     if total > 1:

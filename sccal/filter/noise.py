@@ -9,12 +9,13 @@ filter itself over a stretch of the run, with wide log-normal priors that only m
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from itertools import product
 
+import numba
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
@@ -112,6 +113,19 @@ def estimate_noise(
     return likelihood.noise(min(ends, key=lambda one: one[0])[1])
 
 
+@dataclass(frozen=True)
+class _Remembering(RunProblem):
+    """Clear steps depend on the timeline and the ratio of the radii only, and the search comes back to both."""
+
+    known_steps: dict[tuple[int, float], tuple[Floats, Floats]] = field(default_factory=dict)
+
+    def clear_steps(self, constants: Constants) -> tuple[Floats, Floats]:
+        key = (id(self.timeline), constants.radius_right_m / constants.radius_left_m)
+        if key not in self.known_steps:
+            self.known_steps[key] = super().clear_steps(constants)
+        return self.known_steps[key]
+
+
 class _Likelihood:
     """Negative log-posterior of the noise levels' logarithms for one run."""
 
@@ -129,6 +143,7 @@ class _Likelihood:
         if not options.with_offset:
             self.free[[1, 2]] = False
         self.others = _other_scales(aligned, start)
+        self.known_steps: dict[tuple[int, float], tuple[Floats, Floats]] = {}
 
     def noise(self, logs: Floats) -> Noise:
         white, coloured, tau, scale, fix_coloured, fix_tau, slip = (float(v) for v in np.exp(logs))
@@ -151,7 +166,9 @@ class _Likelihood:
         return points
 
     def problem(self, timeline: Timeline, logs: Floats) -> RunProblem:
-        return RunProblem(self.aligned, timeline, self.start, self.noise(logs), self.options, self.extension)
+        return _Remembering(
+            self.aligned, timeline, self.start, self.noise(logs), self.options, self.extension, self.known_steps
+        )
 
     def cost(
         self, problem: RunProblem, logs: Floats, at: At, clear: tuple[Floats, Floats], columns: Columns | None = None
@@ -210,15 +227,15 @@ class _Likelihood:
         """The fast levels from a near point (L-BFGS-B). The kernel frees the GIL, so differences share the cores."""
         fast = np.isin(np.arange(logs.size), FAST)
         whole = self._cost_at(timeline, logs, at)
-        with ThreadPoolExecutor(max_workers=min(os.cpu_count() or 1, 4)) as pool:
+        options = {"maxiter": 5, "maxls": 5, "ftol": 1e-6}
+        limits = Bounds(self.low[fast], self.high[fast])
+        with at_once() as map_at_once:
 
             def cost_and_slope(part: Floats) -> tuple[float, Floats]:
                 points = [part, *(part + DIFFERENCE * unit for unit in np.eye(part.size))]
-                here, *beside = pool.map(lambda point: whole(_with(logs, fast, point)), points)
+                here, *beside = map_at_once(lambda point: whole(_with(logs, fast, point)), points)
                 return here, (np.array(beside) - here) / DIFFERENCE
 
-            options = {"maxiter": 5, "maxls": 5, "ftol": 1e-6}
-            limits = Bounds(self.low[fast], self.high[fast])
             found = minimize(cost_and_slope, logs[fast], jac=True, method="L-BFGS-B", bounds=limits, options=options)
         return _with(logs, fast, found.x)
 
@@ -232,6 +249,17 @@ class _Likelihood:
             return self.cost(self.problem(timeline, level), level, at, clear, columns)
 
         return cost
+
+
+@contextmanager
+def at_once() -> Iterator[Callable[[Callable[[Floats], float], list[Floats]], Iterable[float]]]:
+    """A ``map`` whose calls share the cores that this process may use; in processes of their own they have one."""
+    cores = min(numba.get_num_threads(), 4)
+    if cores < 2:
+        yield map
+        return
+    with ThreadPoolExecutor(max_workers=cores) as pool:
+        yield pool.map
 
 
 def _with(logs: Floats, chosen: Bools, part: Floats) -> Floats:

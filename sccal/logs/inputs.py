@@ -29,7 +29,7 @@ def input_files(source: RunSource) -> tuple[InputFile, ...]:
         DataError: a file that cannot be read.
     """
     found = []
-    for name, path in _paths(source):
+    for name, path in input_paths(source):
         try:
             with path.open("rb") as file:
                 found.append(InputFile(name, path.stat().st_size, hashlib.file_digest(file, "sha256").hexdigest()))
@@ -38,7 +38,8 @@ def input_files(source: RunSource) -> tuple[InputFile, ...]:
     return tuple(found)
 
 
-def _paths(source: RunSource) -> Iterator[tuple[str, Path]]:
+def input_paths(source: RunSource) -> Iterator[tuple[str, Path]]:
+    """Name and path of every file that a run is read from; nothing is opened."""
     run = source.path
     if run.is_file():
         yield run.name, run

@@ -12,12 +12,13 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from sccal.batch import calibrate_paths
+from sccal.batch import AlsoWritten, calibrate_paths
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.result import Calibration
+from sccal.calibration.single import calibrate_run
 from sccal.geodesy import TangentPlane
 from sccal.logs.run import discover
-from tests.runs import written
+from tests.runs import read, written
 
 Messages = dict[str, list[tuple[int, Any]]]
 
@@ -31,8 +32,9 @@ def result(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
         f"clock.host_epoch_offset_s={request.param}",
         duration_s=90.0,
     )
-    batch = calibrate_paths([root / "logs"], root / "out", CalibrationOptions(), lambda *_: None, with_mcap=True)
-    return batch.calibrated[0], root / "out" / "run" / "calibration.mcap"
+    calibrate_paths([root / "logs"], root / "out", CalibrationOptions(), lambda *_: None, also=AlsoWritten(mcap=True))
+    calibration, _ = calibrate_run(read(root / "logs"), CalibrationOptions())
+    return calibration, root / "out" / "run" / "calibration.mcap"
 
 
 def decoded(path: Path) -> Messages:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from sccal import batch
+from sccal.batch import tasks
 from sccal.calibration.options import CalibrationOptions
 from sccal.errors import Exit, UsageError
 from tests.calibration.test_single import GIVEN
@@ -24,14 +25,14 @@ def run(paths: list[Path], out: Path):
 def test_a_bug_in_one_run_leaves_the_others_their_results(tmp_path, monkeypatch, capsys):
     for name in ("a", "b", "c"):
         written(tmp_path / "logs" / name, duration_s=60)
-    honest = batch.calibrate_run
+    honest = tasks.calibrate_run
 
     def buggy(one, options):
         if one.name == "b":
             raise ZeroDivisionError("float division by zero")
         return honest(one, options)
 
-    monkeypatch.setattr(batch, "calibrate_run", buggy)
+    monkeypatch.setattr(tasks, "calibrate_run", buggy)
     found, told = run([tmp_path / "logs"], tmp_path / "out")
     assert [name for name, _ in told] == ["a", "b", "c"]
     assert [one.run for one in found.calibrated] == ["a", "c"]

@@ -1,0 +1,39 @@
+"""A batch as CI and people look at it: gates judged, then the index, JUnit XML and the page of a CI step written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from sccal.batch.calibrating import Batch
+from sccal.gates.asked import Asked
+from sccal.gates.result import BatchOutcome
+from sccal.logs.write import write_text
+from sccal.report.index_write import write_summary
+from sccal.report.junit import junit_xml
+from sccal.report.step_summary import append_step_summary
+from sccal.summary import summarise
+
+
+def judged(batch: Batch, asked: Asked) -> BatchOutcome:
+    """What the batch gave, and how the gates ended.
+
+    Raises:
+        UsageError: a gate asks for what no result has, or the baseline is of other vehicles.
+    """
+    gates = asked.judge(batch.saved, batch.saved_vehicles)
+    return BatchOutcome(tuple(batch.saved), tuple(batch.saved_vehicles), tuple(batch.failures), gates)
+
+
+def write_outcome(outcome: BatchOutcome, out: Path, junit: Path | None = None) -> Path | None:
+    """The index in ``out`` (None where no run gave a result), JUnit XML, and the page of a GitHub step if there is one.
+
+    Raises:
+        UsageError: a file cannot be written.
+    """
+    if junit is not None:
+        write_text(junit, junit_xml(outcome))
+    append_step_summary(outcome, os.environ)
+    if not outcome.runs:
+        return None
+    return write_summary(summarise(outcome.runs, outcome.vehicles, outcome.failures), out, outcome.gates)

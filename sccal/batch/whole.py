@@ -1,0 +1,75 @@
+"""The vehicle from its runs' records; a run is opened again only where its record does not say enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from sccal.batch.processes import Crew
+from sccal.batch.record import RunRecord
+from sccal.batch.remote import fetched
+from sccal.batch.tasks import CalibrateRun, LineariseAgain, one_thread, prepared_again
+from sccal.calibration.combine import combine, combined, only_run
+from sccal.calibration.result import VehicleCalibration
+from sccal.calibration.shared import MAX_ROUNDS, SharedFit, SharedLikelihood, far_off, pooled, stayed
+from sccal.diagnose.honest import with_honest_vehicle
+from sccal.errors import SccalError
+
+
+@dataclass(frozen=True)
+class Member:
+    """One calibrated run of a vehicle."""
+
+    task: CalibrateRun
+    record: RunRecord
+
+
+def vehicle_of_runs(members: Sequence[Member], crew: Crew) -> VehicleCalibration:
+    """One result for all runs of a vehicle, one or more.
+
+    Raises:
+        SccalError: a run has to be opened again and cannot be.
+    """
+    runs = [one.record.calibration for one in members]
+    if len(members) == 1:
+        return only_run(runs[0])
+    likelihoods = [one.record.likelihood for one in members if one.record.likelihood is not None]
+    with one_thread():
+        if len(likelihoods) < len(members):
+            return _with_effects(members)
+        return combined(runs, members[0].task.options.filter, _joint(members, likelihoods, crew))
+
+
+def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], crew: Crew) -> SharedFit:
+    """The joint answer; runs far off it are linearised again there, until it stays."""
+    fit = pooled(likelihoods)
+    for _ in range(MAX_ROUNDS - 1):
+        far = far_off(likelihoods, fit)
+        if not far:
+            break
+        tasks = [
+            LineariseAgain(task.source, task.options, task.read, members[place].record.calibration.noise, fit.mode)
+            for place in far
+            for task in (members[place].task,)
+        ]
+        for number, found in crew.each(tasks):
+            if isinstance(found, SccalError):
+                raise type(found)(f"{members[far[number]].task.source.name}: {found}")
+            likelihoods[far[number]] = found
+        before, fit = fit, pooled(likelihoods)
+        if stayed(before, fit):
+            break
+    return fit
+
+
+def _with_effects(members: Sequence[Member]) -> VehicleCalibration:
+    """All runs prepared again at once, by the noise that they were found to have."""
+    with ExitStack() as stack:
+        problems = []
+        for one in members:
+            source = stack.enter_context(fetched(one.task.source))
+            noise = one.record.calibration.noise
+            problems.append(prepared_again(source, one.task.options, one.task.read, noise))
+        vehicle = combine([one.record.calibration for one in members], problems)
+        return with_honest_vehicle(vehicle, problems)

@@ -1,0 +1,63 @@
+"""Processes: all tasks done, one that is killed told and replaced, none left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+
+import pytest
+
+from sccal.batch.processes import Here, Processes
+from sccal.errors import SccalError
+
+
+@dataclass(frozen=True)
+class Square:
+    number: int
+
+    def __call__(self) -> int:
+        return self.number**2
+
+
+@dataclass(frozen=True)
+class Killed:
+    number: int
+
+    def __call__(self) -> int:
+        os.kill(os.getpid(), self.number)
+        time.sleep(60)
+        return 0
+
+
+@pytest.fixture(scope="module")
+def crew():
+    processes = Processes(2)
+    yield processes
+    processes.stop()
+
+
+def test_every_task_is_done_once_whoever_does_it(crew):
+    tasks = [Square(k) for k in range(20)]
+    assert sorted(crew.each(tasks)) == sorted(Here().each(tasks)) == [(k, k * k) for k in range(20)]
+
+
+def test_a_killed_process_is_told_and_takes_no_other_task_with_it(crew):
+    tasks = [Square(0), Killed(signal.SIGKILL), Square(2), Square(3), Square(4)]
+    found = dict(crew.each(tasks))
+    error = found.pop(1)
+    assert isinstance(error, SccalError)
+    assert "SIGKILL" in str(error)
+    assert "--jobs" in str(error)
+    assert found == {0: 0, 2: 4, 3: 9, 4: 16}
+    assert dict(crew.each([Square(5)])) == {0: 25}
+
+
+def test_nothing_is_left_behind():
+    crew = Processes(2)
+    pids = [worker.process.pid for worker in crew._idle]
+    crew.stop()
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
