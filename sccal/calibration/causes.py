@@ -102,7 +102,7 @@ def binned(
     whole = np.zeros(places)
     whole[enough] = mean
     sigma = np.sqrt(np.maximum(square - mean**2, 0.0) / (n - 1) * _in_a_row(some - whole[place]))
-    middle = (low + width * (np.arange(places) + 0.5 - shift))[enough]
+    middle = np.asarray(low + width * (np.arange(places) + 0.5 - shift), dtype=np.float64)[enough]
     told = sigma > 0.0
     chi2 = float(np.sum((mean[told] / sigma[told]) ** 2))
     chance = float(gammaincc(0.5 * told.sum(), 0.5 * chi2)) if told.any() else float("nan")
