@@ -35,7 +35,7 @@ def lines_run(node: Any) -> Iterator[str]:
 
 
 SHELL = [line for workflow in WORKFLOWS for line in lines_run(workflow) if line.startswith("sccal ")]
-SHOWN = re.findall(r"^ {4}(sccal .+?)(?:\s+#.*)?$", PAGE, re.M)
+SHOWN = re.findall(r"^(?: {4})?(sccal .+?)(?:\s+#.*)?$", PAGE, re.M)
 QUOTED = re.findall(r"`(--(?:gate|allow-drift) [^`]*)`", PAGE)
 
 
@@ -47,7 +47,7 @@ def options_of(line: str) -> list[tuple[str, str]]:
 def test_there_is_something_to_check():
     assert len(WORKFLOWS) == 2
     assert len(SHELL) == 3
-    assert len(SHOWN) == 3
+    assert len(SHOWN) == 6
     assert len(QUOTED) >= 4
 
 
@@ -55,10 +55,6 @@ def test_there_is_something_to_check():
 def test_commands_are_understood(line):
     _, name, *arguments = shlex.split(line)
     command = COMMANDS.commands[name]
-    known = {option for parameter in command.params for option in parameter.opts}
-    missing = {option for option, _ in options_of(line)} - known
-    if name == "calibrate" and missing:
-        pytest.skip(f"calibrate does not have {' '.join(sorted(missing))} yet")
     assert command.make_context(name, arguments).params
 
 
@@ -72,5 +68,5 @@ def test_gates_and_allowances_can_be_read(line):
 
 
 def test_every_exit_code_is_told():
-    told = [int(code) for code in re.findall(r"^\| (\d) \|", PAGE, re.M)]
+    told = [int(code) for code in re.findall(r"^\| (\d+) \|", PAGE, re.M)]
     assert told == [int(code) for code in Exit]
