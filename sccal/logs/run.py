@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
 from sccal.logs.mcap_file import RESULT_LIBRARY, library_of
 from sccal.logs.mcap_run import MESSAGE_SUFFIXES, read_message_log
+from sccal.logs.names import natural_key
 from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.options import ReadOptions
 from sccal.logs.reference import read_reference
@@ -56,7 +56,7 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
         places = [path] if is_message_file(path) else _run_places(root)
         sources = [
             RunSource(_name_below(root, place), place, _nearest_vehicle(_folder_of(place), root), root)
-            for place in sorted(places, key=lambda place: _natural(place.relative_to(root)))
+            for place in sorted(places, key=lambda place: natural_key(place.relative_to(root)))
         ]
         if not sources:
             raise DataError(
@@ -248,14 +248,6 @@ def _name_below(root: Path, place: Path) -> str:
     if place.is_file():
         return relative[: -len(place.suffix)]
     return relative if relative != "." else root.resolve().name or "run"
-
-
-def _natural(path: Path) -> list[list[tuple[int, int, str]]]:
-    """A key that sorts run2 before run10."""
-    return [
-        [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"([0-9]+)", name) if part]
-        for name in path.parts
-    ]
 
 
 def _with_unique_names(sources: list[RunSource]) -> list[RunSource]:

@@ -15,10 +15,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import PurePosixPath
 
 import numpy as np
 
 from sccal.arrays import Bools, Floats
+from sccal.logs.names import natural_key
 from sccal.results.saved import PARAMETERS, Saved, SavedEstimate
 from sccal.summary.result import Chart, NoChart
 from sccal.summary.trends import MEDIAN_OF_A_NORMAL, best_trend, on_all_runs
@@ -122,7 +124,7 @@ def _chart(key: str, runs: Sequence[tuple[DatedRun, SavedEstimate]], of_all: int
     moments_s = [run.started_s for run, _ in dates if run.started_s is not None]
     by_date = len(dates) >= max(FEWEST_RUNS, len(runs) / 2) and max(moments_s) - min(moments_s) > SHORTEST_SPAN_S
     if by_date:
-        runs = sorted(dates, key=lambda run: (run[0].started_s or 0.0, run[0].saved.run))
+        runs = sorted(dates, key=lambda run: (run[0].started_s or 0.0, natural_key(PurePosixPath(run[0].saved.run))))
     if len(runs) < FEWEST_RUNS:
         return NoChart(key, f"{len(runs)} of {of_all} runs estimated it; a chart needs {FEWEST_RUNS}")
     value = np.array([estimate.value for _, estimate in runs])

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import PurePosixPath
 from typing import Any
 
 from sccal.errors import Failure
+from sccal.logs.names import natural_key
 from sccal.results.saved import Saved
 from sccal.summary.charts import DatedRun, charts_of, dated
 from sccal.summary.paths import thin_path
@@ -26,7 +28,7 @@ def summarise(runs: Sequence[Saved], vehicles: Sequence[Saved], failures: Sequen
     A run belongs to the vehicle whose file names it, else to those of the same name. Runs and failures come out in
     the order of their names, whatever the order in which they were done.
     """
-    ordered = [dated(saved) for saved in sorted(runs, key=lambda saved: saved.run)]
+    ordered = [dated(saved) for saved in sorted(runs, key=lambda saved: natural_key(PurePosixPath(saved.run)))]
     members = _by_vehicle(ordered, vehicles)
     label_of = {run.saved.run: label for label, (_, its_runs) in members.items() for run in its_runs}
     most = max(8, min(MOST_CORNERS, CORNERS_IN_ALL // max(len(ordered), 1)))
@@ -38,7 +40,7 @@ def summarise(runs: Sequence[Saved], vehicles: Sequence[Saved], failures: Sequen
         failures=tuple(
             sorted(
                 (FailedRun(one.name, str(one.error), int(one.error.exit_code)) for one in failures),
-                key=lambda failed: failed.run,
+                key=lambda failed: natural_key(PurePosixPath(failed.run)),
             )
         ),
         vehicles=tuple(
