@@ -16,7 +16,9 @@ from random import Random
 
 import atheris
 
-with atheris.instrument_imports(include=["sccal.logs", "sccal.align", "rosbags"], exclude=["sccal.align.denoise"]):
+with atheris.instrument_imports(
+    include=["sccal.logs", "sccal.align", "rosbags"], exclude=["sccal.align.denoise", "sccal.align.whitening"]
+):
     from fuzz.readers import READERS, feed, signature
 from fuzz.mutate import mutator_of
 from fuzz.seeds import seeds_of

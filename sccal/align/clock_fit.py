@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.align.path import laid_out
+from sccal.align.whitening import innovations
 from sccal.arrays import Bools, Complexes, Floats, Ints
-from sccal.compiled import compiled
 
 CELL_S = 1.0
 MOST_CELLS = 2400
@@ -273,24 +273,7 @@ def _filtered(steps: Floats, lam: float, ar: Floats) -> Floats:
     """Innovations of the columns (n, k) of one channel, and (n,) of what stood before its first step."""
     before = np.zeros((steps.shape[0], 1))
     before[0] = -lam
-    return _innovations(np.hstack((steps, before)), lam, ar)
-
-
-@compiled
-def _innovations(steps: Floats, lam: float, ar: Floats) -> Floats:
-    """w_n = s_n + λ w_n−1 down the rows, then w_n − Σ ar_k w_n−k; what is before the first row is zero."""
-    white = steps.copy()
-    for n in range(1, steps.shape[0]):
-        for column in range(steps.shape[1]):
-            white[n, column] += lam * white[n - 1, column]
-    if ar.shape[0] == 0:
-        return white
-    left = white.copy()
-    for n in range(1, steps.shape[0]):
-        for k in range(min(n, ar.shape[0])):
-            for column in range(steps.shape[1]):
-                left[n, column] -= ar[k] * white[n - 1 - k, column]
-    return left
+    return innovations(np.hstack((steps, before)), lam, ar)
 
 
 def _whitened(steps: tuple[Floats, Floats], filters: Filters) -> tuple[Floats, Floats]:
