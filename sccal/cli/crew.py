@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from sccal.batch.processes import ONE_THREAD, Crew, Here, Processes
 from sccal.errors import UsageError
 
-_A_RUN_HOLDS = ("encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv", "metadata.yaml")
+_RUN_FILES = {"encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv", "metadata.yaml"}
+_RUN_SUFFIXES = (".mcap", ".db3", ".bag")
+_MOST_FOLDERS = 10_000
+_SHORT_BYTES = 4_000_000
+"""Of the files of a run of five minutes or so."""
 
 
 def crew_for(paths: Sequence[Path | str], jobs: int | None, scheduler: str = "") -> Crew:
@@ -24,8 +29,12 @@ def crew_for(paths: Sequence[Path | str], jobs: int | None, scheduler: str = "")
         from sccal.batch.cluster import Cluster
 
         return Cluster(scheduler)
-    count = usable_cores() if jobs is None else jobs
-    return Processes(count) if count > 1 and _may_hold_several(paths) else Here()
+    cores = usable_cores()
+    runs, size_bytes = at_sight(paths, 2 * cores if jobs is None else jobs)
+    # A few short runs are done sooner here than another process has loaded what they need.
+    worth = (runs + size_bytes // _SHORT_BYTES) // 2
+    count = min(runs, worth, cores) if jobs is None else min(jobs, runs)
+    return Processes(count) if count > 1 else Here()
 
 
 def usable_cores() -> int:
@@ -41,10 +50,22 @@ def one_thread_each() -> None:
         os.environ.setdefault(name, "1")
 
 
-def _may_hold_several(paths: Sequence[Path | str]) -> bool:
-    if len(paths) != 1:
-        return True
-    (only,) = paths
-    if isinstance(only, str):
-        return True
-    return only.is_dir() and not any((only / name).exists() for name in _A_RUN_HOLDS)
+def at_sight(paths: Sequence[Path | str], most: int) -> tuple[int, int]:
+    """How many runs the paths seem to hold (up to ``most``, and so many where it cannot be seen), and their bytes."""
+    count = folders = size_bytes = 0
+    for path in paths:
+        if isinstance(path, str):
+            return most, most * _SHORT_BYTES
+        walk = [(str(path.parent), [], [path.name])] if path.is_file() else os.walk(path)
+        for folder, below, files in walk:
+            below[:] = [name for name in below if not name.startswith(".")]
+            messages = [name for name in files if name.lower().endswith(_RUN_SUFFIXES)]
+            count += not _RUN_FILES.isdisjoint(files)
+            count += len(messages)
+            for name in [*messages, *_RUN_FILES.intersection(files)]:
+                with suppress(OSError):
+                    size_bytes += Path(folder, name).stat().st_size
+            folders += 1
+            if count >= most or folders >= _MOST_FOLDERS:
+                return most, max(size_bytes, count * _SHORT_BYTES)
+    return count, size_bytes

@@ -44,10 +44,10 @@ class Robot:
 def calibrated(folder: Path, *chosen: str, effects: tuple[str, ...] = (), duration_s: float = 150.0) -> Robot:
     settings = settings_from([f"drive.duration_s={duration_s}", *SMALL, *SOUTH_WEST, *chosen], seed=5)
     simulated = simulate_run(settings)
-    write_run(simulated, folder / "logs" / "yard")
-    write_vehicle_file(settings, folder / "logs" / "yard")
-    calibration, _ = calibrate_run(read(folder / "logs" / "yard"), CalibrationOptions(effects=effects))
-    results = folder / "out" / "yard"
+    write_run(simulated, folder / "logs" / "monday")
+    write_vehicle_file(settings, folder / "logs" / "monday")
+    calibration, _ = calibrate_run(read(folder / "logs" / "monday"), CalibrationOptions(effects=effects))
+    results = folder / "out" / "monday"
     write_numbers(calibration, results)
     return Robot(results, simulated, calibration)
 

@@ -38,9 +38,9 @@ def ends(monkeypatch, *arguments):
 def out(enu_robot, tmp_path, monkeypatch):
     """A folder of results with a run and a vehicle, to work in from beside it."""
     folder = tmp_path / "out"
-    (folder / "yard").mkdir(parents=True)
+    (folder / "monday").mkdir(parents=True)
     for file in enu_robot.results.iterdir():
-        (folder / "yard" / file.name).write_bytes(file.read_bytes())
+        (folder / "monday" / file.name).write_bytes(file.read_bytes())
     document = enu_robot.exported.saved.document | {"run": "(vehicle)", "runs": [{}, {}]}
     (folder / "vehicle.json").write_text(json_text(document))
     monkeypatch.chdir(tmp_path)
@@ -56,10 +56,10 @@ def test_formats_are_listed_a_line_each(arguments):
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_output_and_file_are_the_same(name, out):
-    printed = run(name, "out/yard")
+    printed = run(name, "out/monday")
     assert printed.exit_code == 0
-    assert printed.stdout == FORMATS[name].write(read_result(out / "yard"))
-    written = run(name, "out/yard/calibration.json", "-o", "file")
+    assert printed.stdout == FORMATS[name].write(read_result(out / "monday"))
+    written = run(name, "out/monday/calibration.json", "-o", "file")
     assert (written.exit_code, written.stdout) == (0, "")
     assert Path("file").read_text(encoding="utf-8") == printed.stdout
     assert [path.name for path in Path().iterdir() if path.name.startswith(".")] == []
@@ -72,7 +72,7 @@ def test_a_vehicles_parameters_and_no_path(out, monkeypatch, capsys):
 
 
 def test_what_is_left_out_goes_to_the_error_stream(out):
-    told = run("ros2_control", "out/yard")
+    told = run("ros2_control", "out/monday")
     assert "sccal: ros2_control: lever_arm was estimated too" in told.stderr
     assert "sccal:" not in told.stdout
 
@@ -80,10 +80,10 @@ def test_what_is_left_out_goes_to_the_error_stream(out):
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
-        (("shapefile", "out/yard"), 2, "no format 'shapefile'; there are ros2_control,"),
+        (("shapefile", "out/monday"), 2, "no format 'shapefile'; there are ros2_control,"),
         (("gpx",), 2, "name the results"),
         (("gpx", "nowhere"), 2, "no such file"),
-        (("gpx", "out/yard", "-o", "missing/path.gpx"), 3, "missing/path.gpx: cannot be written"),
+        (("gpx", "out/monday", "-o", "missing/path.gpx"), 3, "missing/path.gpx: cannot be written"),
     ],
 )
 def test_what_cannot_be_done_is_said(out, monkeypatch, capsys, arguments, code, says):
@@ -92,10 +92,10 @@ def test_what_cannot_be_done_is_said(out, monkeypatch, capsys, arguments, code, 
 
 
 def test_a_run_without_its_path_is_said(out, monkeypatch, capsys):
-    (out / "yard" / "trajectory.csv").unlink()
-    assert ends(monkeypatch, "kml", "out/yard") == 3
+    (out / "monday" / "trajectory.csv").unlink()
+    assert ends(monkeypatch, "kml", "out/monday") == 3
     assert "trajectory.csv" in capsys.readouterr().err
-    assert run("ardupilot", "out/yard").exit_code == 0
+    assert run("ardupilot", "out/monday").exit_code == 0
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
