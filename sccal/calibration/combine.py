@@ -134,8 +134,14 @@ def _own_values(run: Calibration, problem: RunProblem) -> Floats:
 
 def _combined_offset(runs: Sequence[Calibration]) -> tuple[Estimate, list[Notice]]:
     """The heading offset belongs to each run; their mean is the mounting's where they agree."""
-    offsets = [run.parameters.heading_offset_rad for run in runs]
+    every = [run.parameters.heading_offset_rad for run in runs]
     if not runs[0].with_offset:
+        return every[0], []
+    # A run that does not show its own offset says nothing of whether they agree.
+    offsets = [one for one in every if one.status == "estimated"]
+    if not offsets:
+        return min(every, key=lambda one: one.sigma), []
+    if len(offsets) == 1:
         return offsets[0], []
     values = np.array([one.value for one in offsets])
     sigmas = np.array([one.sigma for one in offsets])

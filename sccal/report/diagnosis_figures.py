@@ -42,7 +42,7 @@ BARS_UP_TO = 80
 """Points beyond which error bars would only be a grey cloud: then the points stand alone."""
 GRID = 61
 """Moments of a window at which the root mean square over the windows is drawn."""
-_WIDE_IN, _NARROW_IN = 9.6, 5.6
+_WIDE_IN, _NARROW_IN, _HALF_IN = 9.6, 5.6, 5.0
 _LABEL_CHARACTERS = 58
 
 
@@ -54,10 +54,10 @@ def finding_drawings(d: Diagnosis, number: int) -> tuple[Drawing, ...]:
         drawings.append(
             Drawing(
                 f"residual-{number + 1}",
-                "Left: what the model without the effect leaves, averaged over stretches of the quantity that it "
-                "follows, with standard errors; the line is what the effect adds there, as fitted. Right: the same "
-                "with the effect in the model. What is explained lies on zero.",
-                residual_picture(finding.picture),
+                "What the model leaves without the effect and with it, averaged over stretches of the quantity that it "
+                "follows, with standard errors; the line is what the effect adds there, as fitted. What is explained "
+                "lies on zero.",
+                residual_pair(finding.picture),
             )
         )
     if finding.ranking:
@@ -81,7 +81,7 @@ def unexplained_drawing(left: Unexplained) -> Drawing | None:
         "unexplained",
         "What the final model leaves, averaged over stretches of the quantity that it follows, with standard errors; "
         "the line is the pattern as fitted. It has no name yet.",
-        residual_picture(left.picture, titles=("left by the final model", "with the pattern taken away")),
+        residual_pair(left.picture, titles=("left by the final model", "with the pattern taken away")),
     )
 
 
@@ -97,30 +97,51 @@ def drift_drawing(d: Diagnosis) -> Drawing | None:
     )
 
 
-def residual_picture(picture: Picture, titles: tuple[str, str] = ("without the effect", "with the effect")) -> str:
+TITLES = ("without the effect", "with the effect")
+
+
+def residual_picture(picture: Picture, titles: tuple[str, str] = TITLES) -> str:
     """Before with the fitted effect, and after, on one scale; one panel where there is no after."""
-    after_known = bool(np.isfinite(picture.after).any())
     with styled("residual picture"):
         figure = Figure(figsize=(_WIDE_IN, 3.3))
-        panels = list(figure.subplots(1, 2, sharey=True)) if after_known else [figure.add_subplot()]
+        panels = list(figure.subplots(1, _panels(picture), sharey=True, squeeze=False)[0])
         figure.subplots_adjust(left=0.085, right=0.985, bottom=0.145, top=0.91, wspace=0.06)
-        for axes in panels:
-            axes.axhline(0.0, color=BLACK, lw=0.7)
-            axes.set_xlabel(one_line(picture.x_label))
-            axes.xaxis.set_major_locator(MaxNLocator(7))
-        order = np.argsort(picture.x, kind="stable")
-        panels[0].plot(picture.x[order], picture.model[order], color=BLACK, lw=1.4, label="the effect as fitted")
-        _points(panels[0], picture.x, picture.before, picture.before_sigma, VERMILION)
-        panels[0].set_title(titles[0])
+        for k, axes in enumerate(panels):
+            _residual_panel(axes, picture, k, titles[k])
         panels[0].set_ylabel(one_line(picture.y_label))
-        if after_known:
-            _points(panels[1], picture.x, picture.after, picture.after_sigma, BLUE)
-            panels[1].set_title(titles[1])
-        panels[0].set_ylim(_limits(picture))
-        plain_ticks(panels[0], 6)
-        for axes in panels:
-            full_tick_labels(axes)
         return svg_text(figure)
+
+
+def residual_pair(picture: Picture, titles: tuple[str, str] = TITLES) -> str:
+    """The same for a page: a figure for each panel, beside each other where there is room."""
+    figures = []
+    for k in range(_panels(picture)):
+        with styled(f"residual {k}"):
+            figure = Figure(figsize=(_HALF_IN, 3.3))
+            axes = figure.add_axes((0.155, 0.145, 0.815, 0.765))
+            _residual_panel(axes, picture, k, titles[k])
+            axes.set_ylabel(one_line(picture.y_label))
+            figures.append(svg_text(figure))
+    return f'<div class="pair">{"".join(figures)}</div>'
+
+
+def _panels(picture: Picture) -> int:
+    return 1 + bool(np.isfinite(picture.after).any())
+
+
+def _residual_panel(axes: Axes, picture: Picture, k: int, title: str) -> None:
+    axes.axhline(0.0, color=BLACK, lw=0.7)
+    axes.set_xlabel(one_line(picture.x_label))
+    axes.xaxis.set_major_locator(MaxNLocator(7))
+    if k == 0:
+        order = np.argsort(picture.x, kind="stable")
+        axes.plot(picture.x[order], picture.model[order], color=BLACK, lw=1.4, label="the effect as fitted")
+        _points(axes, picture.x, picture.before, picture.before_sigma, VERMILION)
+    else:
+        _points(axes, picture.x, picture.after, picture.after_sigma, BLUE)
+    axes.set_title(title)
+    axes.set_ylim(_limits(picture))
+    plain_ticks(axes, 6)
 
 
 def drift_before_after(before: Judgement, after: Judgement | None) -> str:

@@ -98,7 +98,7 @@ def shown_lines(c: Calibration) -> tuple[Shown, ...]:
 def origin_lines(provenance: Provenance) -> tuple[tuple[str, str], ...]:
     """Versions and options, by name."""
     versions = ", ".join(f"{one_line(name)} {one_line(text)}" for name, text in provenance.versions.items())
-    options = ", ".join(f"{one_line(name)} = {one_line(text)}" for name, text in provenance.options.items())
+    options = ", ".join(f"{one_line(name)} = {one_line(text)}" for name, text in provenance.options.items() if text)
     return (("versions", versions), ("options", options))
 
 

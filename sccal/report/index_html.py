@@ -207,9 +207,12 @@ def _vehicle(vehicle: VehicleSummary, drawn: bool) -> VehiclePart:
 def _chart(vehicle: VehicleSummary, chart: Chart, drawn: bool) -> ChartPart:
     as_shown = shown(chart.key)
     shared = vehicle.parameters.get(chart.key)
+    value = ""
+    if shared is not None and shared.status == "estimated":
+        value = f"{as_shown.text(shared)} {as_shown.unit} over all runs"
     return ChartPart(
         name=as_shown.name,
-        value="" if shared is None else f"{as_shown.text(shared)} {as_shown.unit} over all runs",
+        value=value,
         says=chart_line(chart),
         change=change_sentence(vehicle.label, chart) if chart.trend is not None else "",
         svg=control_chart(vehicle.label, chart) if drawn else "",

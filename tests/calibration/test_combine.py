@@ -9,6 +9,7 @@ import pytest
 
 from sccal.calibration.combine import combine
 from sccal.calibration.options import CalibrationOptions
+from sccal.calibration.result import Estimate
 from sccal.calibration.single import calibrate_run
 from tests.calibration.test_single import GIVEN, NAMES, estimates, truth
 from tests.runs import read, written
@@ -92,3 +93,22 @@ def test_runs_that_disagree_widen_the_sigmas_and_are_told(tmp_path):
     assert abs(radius.value - 0.08087) < 3 * radius.sigma
     assert any("disagree" in str(notice) for notice in vehicle.notices)
     assert all(one.sigma < 1e-4 for run, _ in pairs for one in estimates(run)[:2])
+
+
+def with_offset(run, value_deg, sigma_deg, status):
+    offset = Estimate(np.radians(value_deg), np.radians(sigma_deg), status, "why" * (status != "estimated"))
+    return replace(run, parameters=replace(run.parameters, heading_offset_rad=offset))
+
+
+def test_a_run_that_does_not_show_its_offset_takes_no_part_in_the_vehicles(tmp_path):
+    run, problem = calibrate_run(read(written(tmp_path / "run", duration_s=60.0)), CalibrationOptions())
+    runs = [with_offset(run, 12.0, 0.2, "estimated"), with_offset(run, 12.2, 0.2, "estimated")]
+    lost = with_offset(run, 31.0, 19.0, "unobserved")
+    offset = combine([*runs, lost], [problem] * 3).parameters.heading_offset_rad
+    assert offset.status == "estimated"
+    assert np.degrees(offset.value) == pytest.approx(12.1, abs=0.01)
+    assert (
+        combine([runs[0], lost], [problem] * 2).parameters.heading_offset_rad == runs[0].parameters.heading_offset_rad
+    )
+    alone = combine([lost, lost], [problem] * 2).parameters.heading_offset_rad
+    assert (alone.status, alone.reason) == ("unobserved", "why")

@@ -477,7 +477,8 @@ def test_the_page_tells_the_story_in_order() -> None:
     places = [html.find(chapter) for chapter in chapters]
     assert -1 not in places
     assert places == sorted(places)
-    assert html.count("<svg") == 5
+    assert html.count("<figure") == 5
+    assert html.count("<svg") == 7, "a residual is drawn without its effect and with it"
 
 
 def test_pages_without_findings() -> None:
@@ -486,7 +487,7 @@ def test_pages_without_findings() -> None:
     assert "before" not in re.sub(r"<style>.*?</style>", "", nothing, flags=re.DOTALL).partition("How to read this")[0]
     assert nothing.count("<svg") == 1
     assert "nothing found" not in left_over
-    assert left_over.count("<svg") == 2
+    assert left_over.count("<figure") == 2
     assert diagnosis_html(WITHOUT_WINDOWS).count("<svg") == 2
 
 
