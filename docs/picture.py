@@ -24,8 +24,8 @@ from sccal.logs.run import discover, read_run
 from sccal.logs.write import write_text
 from sccal.report.diagnosis_figures import residual_picture
 from sccal.report.figures import BLUE, parameter_history, plain_ticks, styled, svg_text
-from sccal.report.numbers import plain
 from sccal.report.rows import Row, parameter_rows
+from sccal.results.numbers import plain
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.run import simulate_run

@@ -33,8 +33,8 @@ from sccal.report.figures import (
     svg_text,
     thinned,
 )
-from sccal.report.numbers import one_line, plain, short
 from sccal.report.text import shortened
+from sccal.results.numbers import one_line, plain, short
 
 RANKED_SHOWN = 8
 WINDOWS_SHOWN = 60

@@ -25,10 +25,10 @@ from sccal.report.diagnosis_text import (
 )
 from sccal.report.figures import Drawing
 from sccal.report.html import page
-from sccal.report.numbers import one_line, plain, short
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.summary import warnings_first
 from sccal.report.text import sentence, shortened
+from sccal.results.numbers import one_line, plain, short
 
 RUNS_LISTED = 6
 

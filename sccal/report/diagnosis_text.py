@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 from sccal.calibration.result import Estimate
 from sccal.diagnose.result import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
 from sccal.effects.catalogue import CATALOGUE
-from sccal.report.numbers import MISSING, one_line, plain, short, value_and_sigma
 from sccal.report.rows import Row
 from sccal.report.text import in_columns, labelled, notice_lines, shortened, wrapped
+from sccal.results.numbers import MISSING, one_line, plain, short, value_and_sigma
 
 FINDINGS_IN_THE_VERDICT = 2
 ADVICE_SHOWN = 4

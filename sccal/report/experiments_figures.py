@@ -40,8 +40,8 @@ from sccal.report.figures import (
     styled,
     svg_text,
 )
-from sccal.report.numbers import short
 from sccal.report.text import sentence, shortened
+from sccal.results.numbers import short
 
 COLOURS: dict[Variant, str] = {"without": VERMILION, "with": BLUE}
 WORDS: dict[Variant, str] = {"without": "without offset estimation", "with": "with offset estimation"}

@@ -24,9 +24,9 @@ from sccal.report.experiments_text import (
 )
 from sccal.report.figures import Drawing
 from sccal.report.html import page
-from sccal.report.numbers import one_line, short, value_and_sigma
 from sccal.report.rows import STATUS_WORDS
 from sccal.report.text import sentence
+from sccal.results.numbers import one_line, short, value_and_sigma
 
 _ROWS = ("right radius (m)", "left radius (m)", "track (m)", "heading offset (deg)")
 

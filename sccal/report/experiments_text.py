@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
 from sccal.experiments.plan import FIXES_FIRST_S, LOSS, TOLERANCE_PERCENT, Experiment
 from sccal.experiments.result import Cell, Experiments, Spread
-from sccal.report.numbers import duration, one_line, plain, short
 from sccal.report.text import in_columns, labelled, shortened, wrapped
+from sccal.results.numbers import duration, one_line, plain, short
 
 WITHIN = f"within {TOLERANCE_PERCENT:g} %"
 FAILED_SHOWN = 8

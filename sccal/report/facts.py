@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from sccal.calibration.result import Calibration, Fit, Manoeuvre, Outage, Provenance
-from sccal.report.numbers import MISSING, duration, one_line, plain, short
 from sccal.report.rows import parameter_rows
 from sccal.report.summary import (
     fixes_line,
@@ -17,6 +16,7 @@ from sccal.report.summary import (
     reference_lines,
     unseen_line,
 )
+from sccal.results.numbers import MISSING, duration, one_line, plain, short
 
 KINDS = {
     "straight": "straight ahead",

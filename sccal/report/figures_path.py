@@ -18,9 +18,9 @@ from sccal.report.figures import (
     by_quality,
     strided,
 )
-from sccal.report.numbers import plain, short
 from sccal.report.panel import SIZE, SMALL, Mark, Panel, Sheet, labels, limits, ticks
 from sccal.report.plan import Plan
+from sccal.results.numbers import plain, short
 
 WINDOWS_SHOWN = 400
 OUTER = 0.005

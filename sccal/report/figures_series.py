@@ -20,10 +20,10 @@ from sccal.report.figures import (
     strided,
     thinned,
 )
-from sccal.report.numbers import short
 from sccal.report.panel import Panel, Sheet
 from sccal.report.plan import Plan
 from sccal.report.rows import parameter_rows
+from sccal.results.numbers import short
 
 SETTLED_FROM = 0.25
 """Share of the run after which a parameter's history sets the limits of its panel."""

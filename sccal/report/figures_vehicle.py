@@ -13,9 +13,9 @@ from matplotlib.ticker import MaxNLocator
 from sccal.calibration.result import Estimate, VehicleCalibration
 from sccal.report.figures import BLUE, GREY, PAPER, VERMILION, Drawing, full_tick_labels, styled, svg_text
 from sccal.report.figures_outage import outage_plan
-from sccal.report.numbers import one_line
 from sccal.report.plan import drawn
 from sccal.report.rows import parameter_rows
+from sccal.results.numbers import one_line
 
 RUNS_SHOWN = 40
 _WIDTH_IN = 11.2

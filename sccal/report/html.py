@@ -13,7 +13,6 @@ from sccal.report.advice import advice_on
 from sccal.report.facts import driven_lines, fit_and_outage, fit_facts, origin_lines, shown_lines, started, variant
 from sccal.report.figures_run import run_drawings
 from sccal.report.figures_vehicle import vehicle_drawings
-from sccal.report.numbers import duration, one_line, plain, short
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
     clock_line,
@@ -24,6 +23,7 @@ from sccal.report.summary import (
     warnings_first,
 )
 from sccal.report.verdict import Verdict, run_verdict, vehicle_verdict
+from sccal.results.numbers import duration, one_line, plain, short
 
 _PAGES = Environment(
     loader=PackageLoader("sccal.report", "templates"),

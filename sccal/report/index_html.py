@@ -26,8 +26,8 @@ from sccal.report.index_lines import (
     vehicle_line,
     versions_line,
 )
-from sccal.report.numbers import duration, one_line, plain
 from sccal.report.rows import STATUS_WORDS
+from sccal.results.numbers import duration, one_line, plain
 from sccal.results.saved import PARAMETERS, VEHICLE_RUN, SavedEstimate
 from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
 

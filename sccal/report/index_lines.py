@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from sccal.calibration.result import Estimate
-from sccal.report.numbers import duration, one_line, plain, value_and_sigma
 from sccal.report.rows import effect_rows
+from sccal.results.numbers import duration, one_line, plain, value_and_sigma
 from sccal.results.saved import SavedEstimate
 from sccal.summary.result import Chart, RunLine, Summary, Totals, Trend, VehicleSummary
 

@@ -22,8 +22,8 @@ from sccal.report.inspect_lines import (
     stream_rows,
     witness_line,
 )
-from sccal.report.numbers import one_line
 from sccal.report.summary import warnings_first
+from sccal.results.numbers import one_line
 
 _TAGS: dict[Shown, str] = {"yes": "good", "weak": "partial", "no": "doubtful"}
 _WEIGHTS: dict[Weight, str] = {"refused": "doubtful", "warning": "partial", "note": ""}

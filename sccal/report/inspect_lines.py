@@ -21,8 +21,8 @@ from sccal.inspect.result import (
     StreamName,
     Witness,
 )
-from sccal.report.numbers import MISSING, duration, one_line, plain, short
 from sccal.report.summary import clock_line
+from sccal.results.numbers import MISSING, duration, one_line, plain, short
 
 COLUMNS_TOLD = 12
 FINDINGS_IN_VERDICT = 3

@@ -20,9 +20,9 @@ from sccal.report.inspect_lines import (
     stream_rows,
     witness_line,
 )
-from sccal.report.numbers import one_line
 from sccal.report.summary import notice_text
 from sccal.report.text import in_columns, labelled, wrapped
+from sccal.results.numbers import one_line
 
 NOTICES_SHOWN = 6
 _LEAST_NEEDED = (8, 4, 1)

@@ -23,12 +23,12 @@ from sccal.report.advice import advice_on
 from sccal.report.facts import driven_lines, fit_facts, origin_lines, shown_lines, started, variant
 from sccal.report.figures import FACE, GREEN, GRID, INK, ORANGE, SOFT, VERMILION, styled
 from sccal.report.figures_run import run_plans
-from sccal.report.numbers import one_line
 from sccal.report.panel import Sheet
 from sccal.report.plan import Plan
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import clock_line, drive_line, noise_facts, notice_text, warnings_first
 from sccal.report.verdict import run_verdict
+from sccal.results.numbers import one_line
 
 A4 = (595.28, 841.89)
 MARGIN = 42.0

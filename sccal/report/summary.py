@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from sccal.calibration.result import AgainstReference, Clock, Drive, Fit, Noise, Outage, OutageWindow, Unseen
 from sccal.logs.streams import Notice
-from sccal.report.numbers import MISSING, duration, one_line, plain, short, value_and_sigma
+from sccal.results.numbers import MISSING, duration, one_line, plain, short, value_and_sigma
 
 LOSSES_SHOWN = 5
 

@@ -9,8 +9,8 @@ from typing import Literal
 
 from sccal.calibration.result import Calibration, Estimate, Fit, Noise, Parameters, VehicleCalibration
 from sccal.calibration.status import fixes_wander, heading_wanders
-from sccal.report.numbers import short
 from sccal.report.rows import parameter_rows
+from sccal.results.numbers import short
 
 NIS_LOW = 0.3
 NIS_HIGH = 3.0

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sccal.report.numbers import (
+from sccal.results.numbers import (
     change_percent,
     duration,
     one_line,
