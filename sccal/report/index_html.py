@@ -11,9 +11,9 @@ from urllib.parse import quote
 import numpy as np
 
 from sccal import __version__
+from sccal.gates.result import GateResult
 from sccal.report.html import page
 from sccal.report.index_figures import control_chart, path_strokes
-from sccal.report.index_json import JudgedGate
 from sccal.report.index_lines import (
     LEVEL_MARKS,
     Shown,
@@ -107,7 +107,7 @@ class GateLine:
     failed: tuple[str, ...]
 
 
-def index_html(summary: Summary, gates: Sequence[JudgedGate] = ()) -> str:
+def index_html(summary: Summary, gates: Sequence[GateResult] = ()) -> str:
     """The page; it links to each run's own page, ``<run>/report.html``."""
     columns = _columns(summary)
     many = len(summary.vehicles) > 1
@@ -228,7 +228,7 @@ def _ranked(vehicles: Sequence[VehicleSummary]) -> list[VehicleSummary]:
     return sorted(vehicles, key=rank)
 
 
-def _gates(gates: Sequence[JudgedGate]) -> list[GateLine]:
+def _gates(gates: Sequence[GateResult]) -> list[GateLine]:
     lines = []
     for expression in dict.fromkeys(gate.expression for gate in gates):
         its = [gate for gate in gates if gate.expression == expression]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 from sccal import __version__
+from sccal.gates.result import GateResult
 from sccal.report.as_json import Json, strict_document
+from sccal.report.batch_json import gate_block
 from sccal.report.index_lines import change_sentence
 from sccal.results.saved import SavedEstimate
 from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
@@ -14,39 +15,7 @@ from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
 SCHEMA = "sccal.summary/1"
 
 
-class JudgedGate(Protocol):
-    """A gate that was judged, as ``sccal.gates`` gives it."""
-
-    @property
-    def run(self) -> str:
-        """Which result it judged."""
-
-    @property
-    def vehicle(self) -> str:
-        """Whose that is."""
-
-    @property
-    def expression(self) -> str:
-        """As it was asked for."""
-
-    @property
-    def outcome(self) -> str:
-        """``passed``, ``failed`` or ``skipped``."""
-
-    @property
-    def measured(self) -> float | str | None:
-        """None where the value is missing."""
-
-    @property
-    def threshold(self) -> float | str | None:
-        """What it was held against."""
-
-    @property
-    def reason(self) -> str:
-        """Why it failed or was skipped."""
-
-
-def summary_json(summary: Summary, gates: Sequence[JudgedGate] = ()) -> Json:
+def summary_json(summary: Summary, gates: Sequence[GateResult] = ()) -> Json:
     """Lengths in m, angles in degrees; folders are named from the folder of results."""
     totals = summary.totals
     return strict_document(
@@ -67,18 +36,7 @@ def summary_json(summary: Summary, gates: Sequence[JudgedGate] = ()) -> Json:
                 {"run": one.run, "reason": one.reason, "exit_code": one.exit_code} for one in summary.failures
             ],
             "vehicles": [_vehicle(vehicle) for vehicle in summary.vehicles],
-            "gates": [
-                {
-                    "run": gate.run,
-                    "vehicle": gate.vehicle,
-                    "expression": gate.expression,
-                    "outcome": gate.outcome,
-                    "measured": gate.measured,
-                    "threshold": gate.threshold,
-                    "reason": gate.reason,
-                }
-                for gate in gates
-            ],
+            "gates": [gate_block(gate) for gate in gates],
         }
     )
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from sccal.gates.result import GateResult
 from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.index_csv import summary_csv
-from sccal.report.index_json import JudgedGate, summary_json
+from sccal.report.index_json import summary_json
 from sccal.summary.result import Summary
 
 INDEX_FILE = "index.html"
@@ -16,7 +17,7 @@ SUMMARY_FILE = "summary.json"
 TABLE_FILE = "summary.csv"
 
 
-def write_summary(summary: Summary, out: Path, gates: Sequence[JudgedGate] = ()) -> Path:
+def write_summary(summary: Summary, out: Path, gates: Sequence[GateResult] = ()) -> Path:
     """summary.json, summary.csv and index.html, which expects the runs' folders beside it; returns the page."""
     from sccal.report.index_html import index_html
 
