@@ -1,7 +1,7 @@
 """``python -m benchmarks``: everything that is timed, in turn; ``python -m benchmarks.messages`` times a part of it."""
 
-from benchmarks import degrade, messages, pipeline
+from benchmarks import batch, degrade, messages, pipeline
 
-for part in (pipeline, messages, degrade):
+for part in (pipeline, messages, degrade, batch):
     part.main()
     print()
