@@ -166,9 +166,8 @@ def _antenna_path(aligned: Aligned, fixes: Complexes, t_s: Floats) -> tuple[Floa
     weight = np.ones(first.size)
     small = 1e-6 * np.eye(2)
     for _ in range(5):
-        weighted = weight[:, None] * x
-        normal = np.array([[np.vdot(a, b) for b in x.T] for a in weighted.T])
-        right = np.array([np.vdot(a, y) for a in weighted.T])
+        weighted = (weight[:, None] * x).conj().T
+        normal, right = weighted @ x, weighted @ y
         solution = np.linalg.solve(normal + small * max(float(np.trace(normal).real), 1e-9), right)
         off = np.abs(y - x[:, 0] * solution[0] - x[:, 1] * solution[1])
         weight = 1.0 / np.maximum(off / max(float(np.median(off)), 1e-3), 1.0)

@@ -78,16 +78,24 @@ def fixes_of(run: Filter) -> Floats:
 def drift_in_window(aligned: Aligned, window_s: tuple[float, float], t_s: Floats, apart_m: Floats) -> OutageWindow:
     """One window's figures from its fixes' times (k,) and how far they are from the predicted antenna (k, 2)."""
     drift = np.hypot(apart_m[:, 0], apart_m[:, 1])
-    travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(aligned.travel_m)))))
     return OutageWindow(
         start_s=window_s[0],
         end_s=window_s[1],
-        distance_m=float(np.diff(np.interp(window_s, aligned.wheel_t_s, travelled))[0]),
+        distance_m=_travelled_m(aligned, window_s),
         rms_drift_m=float(np.sqrt(np.mean(drift**2))),
         end_drift_m=float(drift[-1]),
         t_s=t_s,
         drift_m=drift,
     )
+
+
+def _travelled_m(aligned: Aligned, window_s: tuple[float, float]) -> float:
+    """By the wheels, forwards and backwards alike."""
+    first, last = np.searchsorted(aligned.wheel_t_s, window_s)
+    rows = slice(max(int(first) - 1, 0), int(last) + 1)
+    steps = np.abs(np.diff(aligned.right_rad[rows] + aligned.left_rad[rows]))
+    travelled = 0.5 * aligned.vehicle.wheel_radius_m * np.concatenate(([0.0], np.cumsum(steps)))
+    return float(np.diff(np.interp(window_s, aligned.wheel_t_s[rows], travelled))[0])
 
 
 def isolated(rejected: Bools, too_many: int) -> Bools:
