@@ -101,25 +101,25 @@ def calibrate(
     from sccal.gates.asked import read_asked
     from sccal.logs.windows import parse_window
 
-    options = CalibrationOptions(
-        filter=FilterOptions(
-            with_offset=not no_offset,
-            radius_prior=radius_prior / 100.0,
-            radius_difference_prior=difference_prior / 100.0,
-            track_prior=track_prior / 100.0,
-            radius_walk=radius_walk * 1e-6,
-            track_walk=track_walk * 1e-6,
-            offset_walk_rad=float(np.radians(offset_walk)),
-            gate_sigmas=outlier_gate,
-        ),
-        outage_window_s=window,
-        output_rate_hz=rate,
-        heading_rate_hz=heading_rate,
-        effects=estimated,
-        withhold_s=tuple(parse_window(text) for text in withhold or []),
-    )
     lines = sys.stderr if as_json else sys.stdout
     try:
+        options = CalibrationOptions(
+            filter=FilterOptions(
+                with_offset=not no_offset,
+                radius_prior=radius_prior / 100.0,
+                radius_difference_prior=difference_prior / 100.0,
+                track_prior=track_prior / 100.0,
+                radius_walk=radius_walk * 1e-6,
+                track_walk=track_walk * 1e-6,
+                offset_walk_rad=float(np.radians(offset_walk)),
+                gate_sigmas=outlier_gate,
+            ),
+            outage_window_s=window,
+            output_rate_hz=rate,
+            heading_rate_hz=heading_rate,
+            effects=estimated,
+            withhold_s=tuple(parse_window(text) for text in withhold or []),
+        )
         asked = read_asked(gate or [], baseline, allow_drift or [], estimated)
         with progress_on(lines) as bar, redirect_stdout(lines):
             teller = _Teller(bar)
