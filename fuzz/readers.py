@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import numpy as np
 
@@ -170,39 +171,20 @@ def _vehicle(path: Path) -> Vehicle:
     return Vehicle("fuzzed", path.with_name("vehicle.toml"), 0.08, 0.7, 32768.0)
 
 
-def _encoder(path: Path) -> str:
-    stream, notices = read_encoder(path, _vehicle(path))
-    check_wheels(stream)
-    _check_notices(notices)
-    return "wheels"
+def _read_encoder(path: Path) -> tuple[WheelStream, tuple[Notice, ...]]:
+    return read_encoder(path, _vehicle(path))
 
 
-def _ahrs(path: Path) -> str:
-    stream, notices = read_ahrs(path)
-    check_heading(stream)
-    _check_notices(notices)
-    return "heading"
+def _stream(read: Callable[[Path], Any], check: Callable[[Any], None], answer: str) -> Callable[[Path], str]:
+    """A reader of one stream and its notices as a target."""
 
+    def feed_stream(path: Path) -> str:
+        stream, notices = read(path)
+        check(stream)
+        _check_notices(notices)
+        return answer
 
-def _gnss_csv(path: Path) -> str:
-    stream, notices = read_gnss_csv(path)
-    check_fixes(stream)
-    _check_notices(notices)
-    return "fixes"
-
-
-def _nmea(path: Path) -> str:
-    stream, notices = read_nmea(path)
-    check_fixes(stream)
-    _check_notices(notices)
-    return "fixes"
-
-
-def _nmea_heading(path: Path) -> str:
-    stream, notices = read_nmea_heading(path)
-    check_heading(stream)
-    _check_notices(notices)
-    return "heading"
+    return feed_stream
 
 
 def _vehicle_toml(path: Path) -> str:
@@ -311,11 +293,11 @@ def _commanded(arguments: list[str], path: Path) -> bool:
 READERS = {
     reader.name: reader
     for reader in (
-        Reader("encoder", "encoder.csv", _encoder),
-        Reader("ahrs", "ahrs.csv", _ahrs),
-        Reader("gnss_csv", "gnss.csv", _gnss_csv),
-        Reader("nmea", "gnss.nmea", _nmea),
-        Reader("nmea_heading", "gnss.nmea", _nmea_heading),
+        Reader("encoder", "encoder.csv", _stream(_read_encoder, check_wheels, "wheels")),
+        Reader("ahrs", "ahrs.csv", _stream(read_ahrs, check_heading, "heading")),
+        Reader("gnss_csv", "gnss.csv", _stream(read_gnss_csv, check_fixes, "fixes")),
+        Reader("nmea", "gnss.nmea", _stream(read_nmea, check_fixes, "fixes")),
+        Reader("nmea_heading", "gnss.nmea", _stream(read_nmea_heading, check_heading, "heading")),
         Reader("vehicle", "vehicle.toml", _vehicle_toml),
         Reader("reference", "reference.csv", _reference),
         Reader("mcap", "log.mcap", _message_log, text=False),

@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from sccal.arrays import Bools, Floats
 from sccal.calibration.result import Consistency
-from sccal.filter.forward import ForwardPass
+from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import RunProblem
 
 STRETCHES = 48
@@ -20,12 +20,10 @@ OUTSIDE = 0.05
 def consistency_over_time(problem: RunProblem, found: ForwardPass) -> tuple[Consistency, ...]:
     """Of fixes (two degrees of freedom each) and headings (one) of one pass; what was never measured is left out."""
     aligned, timeline = problem.aligned, problem.timeline
-    see, snn, sen = found.fix_var_m2.T
-    east, north = found.fix_nu_m.T
-    fix_nis = (snn * east**2 - 2.0 * sen * east * north + see * north**2) / (see * snn - sen**2)
+    of_fixes, _ = fix_nis(found.fix_nu_m, found.fix_var_m2)
     heading_nis = found.heading_nu_rad**2 / found.heading_var_rad2
     both = (
-        in_stretches("fixes", aligned.fix_t_s[timeline.fix_index], fix_nis, found.fix_accepted, 2, aligned.span_s),
+        in_stretches("fixes", aligned.fix_t_s[timeline.fix_index], of_fixes, found.fix_accepted, 2, aligned.span_s),
         in_stretches(
             "headings",
             aligned.heading_t_s[timeline.heading_index],

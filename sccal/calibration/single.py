@@ -32,7 +32,7 @@ from sccal.calibration.result import (
 )
 from sccal.calibration.status import judge
 from sccal.calibration.unseen import unseen_parameters
-from sccal.filter.forward import ForwardPass
+from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem, iterate, reported_covariance, reported_values
 from sccal.filter.noise import estimate_noise
 from sccal.filter.start import ODD_SCALE, Constants, find_start
@@ -152,11 +152,9 @@ def measure_fit(problem: RunProblem, found: ForwardPass) -> Fit:
 
 def fit_of(heading_nu: Floats, heading_var: Floats, fix_nu: Floats, fix_var: Floats, **counts: int) -> Fit:
     """Root mean squares and normalised innovations squared of accepted measurements."""
-    see, snn, sen = fix_var[:, 0], fix_var[:, 1], fix_var[:, 2]
-    e, n = fix_nu[:, 0], fix_nu[:, 1]
-    nis_fix = (snn * e**2 - 2.0 * sen * e * n + see * n**2) / (see * snn - sen**2)
+    nis_fix, _ = fix_nis(fix_nu, fix_var)
     return Fit(
-        gnss_innovation_rms_m=_rms(np.hypot(e, n)),
+        gnss_innovation_rms_m=_rms(np.hypot(fix_nu[:, 0], fix_nu[:, 1])),
         heading_innovation_rms_rad=_rms(heading_nu),
         nis_gnss=float(nis_fix.mean() / 2.0) if nis_fix.size else float("nan"),
         nis_heading=float((heading_nu**2 / heading_var).mean()) if heading_nu.size else float("nan"),

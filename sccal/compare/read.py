@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from sccal.compare.calibrations import compare_calibrations
@@ -10,6 +9,7 @@ from sccal.compare.diagnoses import compare_diagnoses
 from sccal.compare.result import Comparison, Kind
 from sccal.errors import DataError, UsageError
 from sccal.results.diagnosis import DIAGNOSIS_FILE, DIAGNOSIS_SCHEMA, read_diagnosis
+from sccal.results.document import read_document
 from sccal.results.saved import RESULT_FILE, SCHEMA, VEHICLE_FILE, read_saved
 
 KINDS: dict[str, Kind] = {SCHEMA: "calibration", DIAGNOSIS_SCHEMA: "diagnosis"}
@@ -58,11 +58,7 @@ def _results_at(path: Path) -> dict[Kind, Path]:
             names = f"{RESULT_FILE}, {VEHICLE_FILE} or {DIAGNOSIS_FILE}"
             raise UsageError(f"{path}: holds no {names}; name a file, or the folder of one run's results, as OUT/run")
         return there
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise DataError(f"{path}: cannot be read as JSON ({error})") from error
-    schema = document.get("schema") if isinstance(document, dict) else None
-    if not isinstance(schema, str) or schema not in KINDS:
+    _, schema = read_document(path)
+    if schema is None or schema not in KINDS:
         raise DataError(f"{path}: its schema is {schema!r}; compare files of {' or of '.join(KINDS)}")
     return {KINDS[schema]: path}

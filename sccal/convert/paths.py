@@ -20,11 +20,11 @@ from sccal.convert.from_messages import tables_of_messages
 from sccal.convert.tables import NOTE_FILE, RunTables
 from sccal.convert.to_folder import write_folder_of
 from sccal.convert.to_mcap import LIBRARY, write_mcap_of
-from sccal.errors import DataError, Failure, SccalError, UsageError, as_known
+from sccal.errors import DataError, Failure, SccalError, UsageError
 from sccal.logs.mcap_file import library_of
 from sccal.logs.mcap_tables import SCHEMA
 from sccal.logs.options import ReadOptions
-from sccal.logs.outputs import require_apart, vehicle_place
+from sccal.logs.outputs import each_run, require_apart, vehicle_place
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
 from sccal.logs.run import RUN_FILES, RunSource, find_runs, is_bag_folder, is_message_file, vehicle_of
 from sccal.logs.streams import Notice
@@ -59,18 +59,11 @@ def convert_paths(
     sources, failures = find_runs(paths)
     require_apart(out, sources, paths)
     inputs = {source.path.resolve() for source in sources}
-    converted: list[ConvertedRun] = []
-    for source in sources:
-        try:
-            run = _convert(source, out, form or _other_form(source), options, inputs)
-        except Exception as error:
-            known = as_known(error)
-            failures.append(Failure(source.name, known))
-            tell(source, known)
-            continue
-        converted.append(run)
-        tell(source, run)
-    return converted, failures
+
+    def convert(source: RunSource) -> ConvertedRun:
+        return _convert(source, out, form or _other_form(source), options, inputs)
+
+    return each_run(sources, convert, failures, tell), failures
 
 
 def _other_form(source: RunSource) -> Form:

@@ -13,8 +13,8 @@ from pathlib import Path
 from sccal.degrade.faults import Faults
 from sccal.degrade.folder import DegradedRun, degrade_folder
 from sccal.degrade.mcap import degrade_mcap
-from sccal.errors import DataError, Failure, SccalError, as_known
-from sccal.logs.outputs import require_apart, vehicle_place
+from sccal.errors import DataError, Failure, SccalError
+from sccal.logs.outputs import each_run, require_apart, vehicle_place
 from sccal.logs.run import RunSource, find_runs, is_message_file
 
 
@@ -33,23 +33,16 @@ def degrade_paths(
     """
     sources, failures = find_runs(paths)
     require_apart(out, sources, paths)
-    degraded: list[DegradedRun] = []
     runs = {source.path for source in sources}
-    for source in sources:
-        try:
-            if is_message_file(source.path):
-                run = _degrade_file(source, out, faults)
-            else:
-                run = degrade_folder(source, out / source.name, faults, runs - {source.path})
-                _copy_vehicle(source, out)
-        except Exception as error:
-            known = as_known(error)
-            failures.append(Failure(source.name, known))
-            tell(source, known)
-            continue
-        degraded.append(run)
-        tell(source, run)
-    return degraded, failures
+
+    def degrade(source: RunSource) -> DegradedRun:
+        if is_message_file(source.path):
+            return _degrade_file(source, out, faults)
+        run = degrade_folder(source, out / source.name, faults, runs - {source.path})
+        _copy_vehicle(source, out)
+        return run
+
+    return each_run(sources, degrade, failures, tell), failures
 
 
 def _degrade_file(source: RunSource, out: Path, faults: Faults) -> DegradedRun:

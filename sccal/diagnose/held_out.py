@@ -21,7 +21,7 @@ from sccal.calibration.outage import isolated, run_with_outages, summarise
 from sccal.calibration.result import OutageWindow
 from sccal.diagnose.model import Model, names_of
 from sccal.diagnose.parallel import each
-from sccal.filter.forward import ForwardPass
+from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
 
@@ -197,10 +197,8 @@ def _judged(
     leading = problem.aligned.fix_leading[problem.timeline.fix_index]
     fix = (fix_t > settled) & (fix_t <= stretch[1]) & leading & np.isfinite(out.fix_nu[:, 0])
     heading = (heading_t > settled) & (heading_t <= stretch[1]) & np.isfinite(out.heading_nu)
-    see, snn, sen = out.fix_var[fix].T
     e, n = out.fix_nu[fix].T
-    determinant = see * snn - sen**2
-    d2 = (snn * e**2 - 2.0 * sen * e * n + see * n**2) / determinant
+    d2, determinant = fix_nis(out.fix_nu[fix], out.fix_var[fix])
     nll_fix = 0.5 * (np.minimum(d2, 2.0 * CLIP) + np.log(determinant) + 2.0 * np.log(2.0 * np.pi)) / 2.0
     nu, var = out.heading_nu[heading], out.heading_var[heading]
     nll_heading = 0.5 * (np.minimum(nu**2 / var, CLIP) + np.log(2.0 * np.pi * var))

@@ -87,6 +87,14 @@ def say_if_compiling() -> None:
         print("compiling the filter (once, a few seconds) …", file=sys.stderr, flush=True)
 
 
+def fix_nis(nu_m: Floats, var_m2: Floats) -> tuple[Floats, Floats]:
+    """νᵀ S⁻¹ ν and det S (m⁴) of fixes, each (n,): innovations (n, 2), and S_ee, S_nn, S_en (n, 3)."""
+    see, snn, sen = var_m2.T
+    e, n = nu_m.T
+    determinant = see * snn - sen**2
+    return (snn * e**2 - 2.0 * sen * e * n + see * n**2) / determinant, determinant
+
+
 class Filter:
     """The kernel bound to one run's events: start it, run it in parts, fork it."""
 

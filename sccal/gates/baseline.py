@@ -8,7 +8,6 @@ sigma from both (see ``sccal.results.differences``).
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +18,12 @@ from sccal.errors import DataError, UsageError
 from sccal.gates.allowance import Allowance
 from sccal.gates.result import GateResult, Outcome
 from sccal.results.differences import difference, unit_of, why_not_estimated, why_own_log_only
+from sccal.results.document import read_document
 from sccal.results.saved import (
     PARAMETERS,
     SCHEMA,
+    SUMMARY_FILE,
+    SUMMARY_SCHEMA,
     VEHICLE_RUN,
     Json,
     Saved,
@@ -29,9 +31,6 @@ from sccal.results.saved import (
     read_estimate,
     read_saved,
 )
-
-SUMMARY_SCHEMA = "sccal.summary/1"
-SUMMARY_FILE = "summary.json"
 
 _Estimates = Mapping[str, SavedEstimate]
 
@@ -81,11 +80,7 @@ def read_baseline(path: Path) -> Baseline:
     if not path.exists() or path.is_dir():
         saved = read_saved(path)
         return Baseline(saved.path, tuple(_of_calibration(saved)))
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise DataError(f"--baseline {path}: cannot be read as JSON ({error})") from error
-    schema = document.get("schema") if isinstance(document, dict) else None
+    document, schema = read_document(path, "--baseline")
     if schema == SCHEMA:
         return Baseline(path, tuple(_of_calibration(read_saved(path))))
     if schema != SUMMARY_SCHEMA:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
-from sccal.errors import UsageError
+from sccal.errors import Failure, SccalError, UsageError, as_known
 from sccal.logs.run import RunSource
+
+Made = TypeVar("Made")
 
 
 def require_apart(out: Path, sources: Sequence[RunSource], paths: Sequence[Path]) -> None:
@@ -31,6 +34,27 @@ def require_apart(out: Path, sources: Sequence[RunSource], paths: Sequence[Path]
                     raise UsageError(
                         f"--out {out}: {place} overlaps with the logs in {folder}; name a folder outside of them"
                     )
+
+
+def each_run(
+    sources: Sequence[RunSource],
+    work: Callable[[RunSource], Made],
+    failures: list[Failure],
+    tell: Callable[[RunSource, Made | SccalError], None],
+) -> list[Made]:
+    """What the work made of every run, told as it comes; one that fails is told, kept in failures, and stops none."""
+    made: list[Made] = []
+    for source in sources:
+        try:
+            one = work(source)
+        except Exception as error:
+            known = as_known(error)
+            failures.append(Failure(source.name, known))
+            tell(source, known)
+            continue
+        made.append(one)
+        tell(source, one)
+    return made
 
 
 def vehicle_place(source: RunSource, out: Path, own: Path) -> tuple[Path, bool]:

@@ -9,10 +9,8 @@ from sccal.gates.result import GateResult
 from sccal.report.as_json import Json, strict_document
 from sccal.report.batch_json import gate_block
 from sccal.report.index_lines import change_sentence
-from sccal.results.saved import SavedEstimate
+from sccal.results.saved import SUMMARY_SCHEMA, SavedEstimate
 from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
-
-SCHEMA = "sccal.summary/1"
 
 
 def summary_json(summary: Summary, gates: Sequence[GateResult] = ()) -> Json:
@@ -20,7 +18,7 @@ def summary_json(summary: Summary, gates: Sequence[GateResult] = ()) -> Json:
     totals = summary.totals
     return strict_document(
         {
-            "schema": SCHEMA,
+            "schema": SUMMARY_SCHEMA,
             "sccal_version": __version__,
             "totals": {
                 "runs": totals.runs,

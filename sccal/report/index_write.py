@@ -10,10 +10,10 @@ from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.index_csv import summary_csv
 from sccal.report.index_json import summary_json
+from sccal.results.saved import SUMMARY_FILE
 from sccal.summary.result import Summary
 
 INDEX_FILE = "index.html"
-SUMMARY_FILE = "summary.json"
 TABLE_FILE = "summary.csv"
 
 

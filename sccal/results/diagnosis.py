@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from sccal.errors import DataError
+from sccal.results.document import read_document
 from sccal.results.saved import PARAMETERS, Json, SavedEstimate, read_estimate
 
 DIAGNOSIS_SCHEMA = "sccal.diagnosis/1"
@@ -76,11 +76,7 @@ def read_diagnosis(path: Path) -> SavedDiagnosis:
     Raises:
         DataError: the file is no diagnosis of the schema.
     """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise DataError(f"{path}: cannot be read as JSON ({error})") from error
-    schema = document.get("schema") if isinstance(document, dict) else None
+    document, schema = read_document(path)
     if schema != DIAGNOSIS_SCHEMA:
         raise DataError(f"{path}: its schema is {schema!r}, not {DIAGNOSIS_SCHEMA}")
     saved = SavedDiagnosis(path, document)

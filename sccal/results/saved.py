@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +12,13 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
+from sccal.results.document import read_document
 
 SCHEMA = "sccal.calibration/1"
+SUMMARY_SCHEMA = "sccal.summary/1"
 RESULT_FILE = "calibration.json"
 VEHICLE_FILE = "vehicle.json"
+SUMMARY_FILE = "summary.json"
 TRAJECTORY_FILE = "trajectory.csv"
 VEHICLE_RUN = "(vehicle)"
 """The ``run`` of a vehicle's file; no folder of results can have that name on its own."""
@@ -106,11 +108,7 @@ def read_saved(path: Path) -> Saved:
         if not there:
             raise UsageError(f"{path}: holds no {RESULT_FILE}; name the folder of one run's results, as OUT/run")
         path = there[0]
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read as JSON ({error})") from error
-    schema = document.get("schema") if isinstance(document, dict) else None
+    document, schema = read_document(path)
     if schema != SCHEMA:
         raise DataError(f"{path}: its schema is {schema!r}, not {SCHEMA}; name a calibration's JSON file or folder")
     saved = Saved(path, document)
