@@ -6,10 +6,12 @@ OUT    ?= out
 FUZZ_SECONDS ?= 60
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lint bench fuzz samples clean
+STUDY_OUT ?= docs
+
+.PHONY: help run test lint bench fuzz study-noise study-effects study-parking samples clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
 
 run: $(VENV)/.ready ## set up if needed, then calibrate sample_logs/ into out/
 	@$(BIN)/sccal calibrate sample_logs --out $(OUT)
@@ -28,6 +30,15 @@ bench: $(VENV)/.ready-dev ## time the filter, the readers and the whole command
 fuzz: $(VENV)/.ready-dev ## feed broken logs to every reader for FUZZ_SECONDS (60)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "atheris>=3"
 	$(BIN)/python -m fuzz --seconds $(FUZZ_SECONDS)
+
+study-noise: $(VENV)/.ready-dev ## 200 effect-free logs of another simulator: noise, verdicts, findings (an hour)
+	$(BIN)/python -m studies noise --out $(STUDY_OUT)/study-noise.md
+
+study-effects: $(VENV)/.ready-dev ## every effect alone, and 60 pairs and triples (two hours)
+	$(BIN)/python -m studies effects --out $(STUDY_OUT)/study-effects.md
+
+study-parking: $(VENV)/.ready-dev ## a robot that parks for up to an hour: the same constants
+	$(BIN)/python -m studies parking --out $(STUDY_OUT)/study-parking.md
 
 samples: $(VENV)/.ready ## make sample_logs/ anew (seeded: the same bytes every time)
 	$(BIN)/sccal simulate --samples sample_logs

@@ -6,14 +6,14 @@ import inspect
 import sys
 
 from sccal.effects.catalogue import CATALOGUE
-from sccal.effects.effect import Effect
+from sccal.effects.effect import Effect, Parameter
 
 HEAD = """# Effects: what a real robot may have that the model lacks
 
 Written from the catalogue (`python docs/effects.py`). `sccal diagnose` tries all of them, and every further column
 of the log; `sccal calibrate LOGS --effects lever_arm,soft_iron` estimates those that you name. An effect's parameter
 is what the real machine does: `gnss_latency` > 0 means that the fix shows an earlier place. Where the equations have
-no other name, p is the parameter, φ a wheel's turned angle, Δθ and ω turn and turn rate, v the speed.
+no other name, p is the parameter, φ a wheel's turned angle, ψ the heading, Δθ and ω turn and turn rate, v the speed.
 """
 
 
@@ -30,11 +30,15 @@ def section(effect: Effect) -> str:
         lines += [*(f"    {line}" for line in equations), ""]
     lines += ["| parameter | unit | prior ± | from … to | one for each |", "|---|---|---|---|---|"]
     for one in effect.parameters:
-        prior = "searched for" if one.shape else f"{one.prior_sigma:g}"
+        prior = _searched(one) if one.shape else f"{one.prior_sigma:g}"
         lines.append(f"| `{one.name}` | {one.unit} | {prior} | {one.lower:g} … {one.upper:g} | {one.scope} |")
     lines += ["", f"* Looks like: {effect.looks_like}.", f"* Drive that shows it: {effect.excited_by}."]
     lines += [f"* Source: {effect.reference}."]
     return "\n".join(lines) + "\n"
+
+
+def _searched(shape: Parameter) -> str:
+    return "searched for" + ("" if shape.left_out is None else f"; {shape.left_out:g} where not told")
 
 
 def equation_lines(effect: Effect) -> list[str]:

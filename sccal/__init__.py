@@ -13,11 +13,12 @@ Conventions, valid everywhere in this package
 
 Rooms, ground floor first; imports point down only
 --------------------------------------------------
-errors · geodesy · randomness · logs (bytes to streams, and back) · align (streams to one timeline of events), simulate
-and degrade (logs with known truth, or a fault) · effects (one file each) · filter (the compiled kernel, the forward
-filter, the noise) · calibration (one run, several runs, outages) · diagnose (what the model lacks), experiments (the
-paper's), inspect (what is in a log) · report (text, json, yaml, figures, html; computes nothing) · batch · cli (parse,
-call, print, exit code)
+errors · arrays · compiled · geodesy · randomness · logs (bytes to streams, and back) · align (streams to one timeline
+of events), simulate, degrade and convert (logs with known truth, with a fault, in another format) · effects (one file
+each) · filter (the compiled kernel, the noise) · evidence (several runs as one problem, the evidence of any set of
+effects) · calibration (one run, several runs, outages, held-out drift) · diagnose (what the model lacks), experiments
+(the paper's), inspect (what is in a log) · results (what files hold) · summary, gates, compare, export (work on
+results) · report (text, json, yaml, figures, html; computes nothing) · batch, samples · cli (parse, call, print)
 
 The model is that of L. Cantelli, S. Ligama, G. Muscato, D. Spina, "Auto-Calibration Methods of Kinematic Parameters
 and Magnetometer Offset for the Localization of a Tracked Mobile Robot", Robotics 2016, 5(4), 23.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ FLOORS = (
     {"align", "convert", "simulate", "degrade"},
     {"effects"},
     {"filter"},
+    {"evidence"},
     {"calibration"},
     {"diagnose", "experiments", "inspect"},
     {"results"},
@@ -86,6 +88,23 @@ def rooms_imported(path: Path) -> Iterator[tuple[int, str]]:
         parts = name.split(".")
         if parts[0] == "sccal" and len(parts) > 1 and not parts[1].startswith("__"):
             yield line, parts[1]
+
+
+def rooms() -> set[str]:
+    """Every room, and every module beside the rooms, that the package has."""
+    return {room_of(path) for path in MODULES} - FREE
+
+
+def test_every_room_stands_on_one_floor():
+    floors = [room for floor in FLOORS for room in floor]
+    assert sorted(floors) == sorted(rooms())
+
+
+def test_every_room_stands_in_the_packages_docstring():
+    """Among its words, as "filter (the compiled kernel, …)" or "simulate and degrade"."""
+    listed = sccal.__doc__.split("Rooms, ground floor first")[1].split("\n\n")[0]
+    named = set(re.findall(r"[a-z_]+", re.sub(r"\([^()]*\)", "", listed)))
+    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - named == set()
 
 
 def test_imports_are_found_wherever_they_stand():

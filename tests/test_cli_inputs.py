@@ -434,7 +434,7 @@ def test_a_receiver_that_froze(broken: Path) -> None:
     (broken / "gnss.nmea").unlink()
     fixes = "".join(f"{1717243200 + 0.2 * i:.3f},37.5256,15.0744\n" for i in range(350))
     (broken / "gnss.csv").write_text("t,lat_deg,lon_deg\n" + fixes)
-    assert "positions change" in refused(broken)
+    assert "repeat another's position" in refused(broken)
 
 
 def test_lines_of_nmea_in_reverse_order(broken: Path) -> None:

@@ -45,8 +45,6 @@ MOSTLY = 0.5
 BETTER = 3.0
 """Another lag must bring the cost down by this factor to say that a stream is shifted."""
 LAGS_S = np.arange(1.0, 15.1, 0.5)
-FROZEN_S = 10.0
-FROZEN_M = 2.0
 
 
 def check_agreement(aligned: Aligned) -> list[Notice]:
@@ -119,15 +117,12 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
     chunks = [part for part in chunks if part.size * window_s > 0.5 * CHUNK_S]
     sigma = _spread(by_fixes - moved, left, fix_t_s, t_s, chunks)
     sigma = np.hypot(sigma, SCALE_ERROR * np.maximum(moved, by_fixes))
-    frozen = _repeated(fixes, path, fix_t_s, t_s)
     shifted = np.array([by_wheels(lag_s) for lag_s in (*-LAGS_S, *LAGS_S)])
     few_apart, few_stuck = (max(2, round(seconds / window_s)) for seconds in (APART_S, STUCK_S))
     apart: list[float] = []
     judged = 0
     for part in chunks:
-        if (np.maximum(moved, by_fixes)[part] > CLEAR_SIGMAS * sigma[part]).sum() < few_apart and not frozen[
-            part
-        ].any():
+        if (np.maximum(moved, by_fixes)[part] > CLEAR_SIGMAS * sigma[part]).sum() < few_apart:
             continue
         judged += 1
         off = (by_fixes[part] - moved[part]) / sigma[part]
@@ -137,7 +132,7 @@ def _fixes_against_wheels(aligned: Aligned) -> list[Notice]:
         others = (by_fixes[part] - shifted[:, part]) / sigma[part]
         best = float(np.minimum(others**2, CLEAR_SIGMAS**2).sum(axis=1).min())
         lagging = bad.sum() >= few_apart and cost > BETTER * best + CLEAR_SIGMAS**2
-        stuck = _longest(one_stands) >= few_stuck or frozen[part].any()
+        stuck = _longest(one_stands) >= few_stuck
         if lagging or stuck or np.mean(bad) > MOSTLY:
             apart.append(float(t_s[part[0]]))
     if not apart:
@@ -212,18 +207,6 @@ def _spread(off_m: Floats, left: Complexes, fix_t_s: Floats, t_s: Floats, chunks
             of_steps = 1.4 * float(np.quantile(some, 0.3))
             spread[part] = np.maximum(spread[part], of_steps * np.sqrt(1.6 / per_cell))
     return spread
-
-
-def _repeated(fixes: Complexes, path: Complexes, fix_t_s: Floats, t_s: Floats) -> Bools:
-    """Windows within a stretch in which the very same position comes again and again while the wheels go on."""
-    frozen = np.zeros(t_s.size - 1, dtype=bool)
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(fixes) != 0) + 1))
-    ends = np.append(starts[1:], fixes.size) - 1
-    for row in np.flatnonzero(fix_t_s[ends] - fix_t_s[starts] >= FROZEN_S):
-        start, end = starts[row], ends[row]
-        if float(np.abs(np.diff(path[start : end + 1])).sum()) > FROZEN_M:
-            frozen |= (t_s[:-1] >= fix_t_s[start]) & (t_s[:-1] < fix_t_s[end])
-    return frozen
 
 
 def _longest(flags: Bools) -> int:

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m, usable
 from sccal.align.agreement import check_agreement
-from sccal.align.clock_fit import Fixes, wheel_path
-from sccal.align.clock_motion import MotionClock, clock_by_motion
 from sccal.align.clocks import Clock, require_overlap
+from sccal.align.digits import OF_ROUNDING, step_of
+from sccal.align.one_clock import (
+    fixes_by_motion,
+    heading_by_turning,
+    path_along,
+    told_together,
+    yaw_to_enu,
+)
 from sccal.align.path import laid_out
 from sccal.align.reference import (
     ReferenceFixes,
@@ -20,20 +27,22 @@ from sccal.align.reference import (
     leading_fixes,
     on_host_clock,
     reference_fixes,
+    rounding_steps_m,
 )
 from sccal.align.signs import check_signs
+from sccal.align.standing import Spans, dither_rad, moving_spans, standing_spans
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.windows import Window, windows_on_clock, within
 
+__all__ = ["Aligned", "Series", "align", "yaw_to_enu"]
+
 MIN_MEASUREMENTS = 10
 LONG_RUN_S = 2 * 86400.0
 MOST_PAUSE_S = 5.0
 """Of the wheels' rows on average, in runs longer than LONG_RUN_S."""
-WHEEL_RATE_HZ = 20.0
-"""As fine as the path need be for comparing clocks."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +91,21 @@ class Aligned:
     """Where the heading comes from, for messages."""
     heading_convention: Convention | None = None
     """Of the source, where it has one of its own; None where vehicle.toml declares it."""
+    yaw_floor_rad: float = 0.0
+    """Standard deviation of the rounding of the AHRS reading: its error is no smaller, whatever repeats."""
+    fix_floor_m: tuple[float, float] = (0.0, 0.0)
+    """The same of the fixes, east and north. The variances hold it; a factor that scales them must not go below it."""
+
+    @cached_property
+    def standing_s(self) -> Spans:
+        """Stretches of some seconds and more in which both wheels stand."""
+        most_rad = dither_rad(self.vehicle.wheel_radius_m, self.vehicle.ticks_per_rev)
+        return standing_spans(self.wheel_t_s, self.right_rad, self.left_rad, self.loose, most_rad)
+
+    @property
+    def moving_spans_s(self) -> Spans:
+        """Stretches in which the robot drives, short stops included: where the levels of the noise are to be learnt."""
+        return moving_spans(self.span_s, self.standing_s)
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -104,11 +128,6 @@ class Aligned:
         return laid_out(self.travel_m, self.yaw_at_wheels_rad)
 
 
-def yaw_to_enu(yaw_rad: Floats, convention: Convention) -> Floats:
-    """A yaw in the file's convention, counter-clockwise from east (same shape, not wrapped)."""
-    return yaw_rad if convention == "enu" else 0.5 * np.pi - yaw_rad
-
-
 def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     """Bring the streams of one run together; fixes inside the windows ``withhold_s`` judge and do not teach.
 
@@ -125,6 +144,11 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         fix_t_s, known, _, _ = on_host_clock(fixes, run.reference, whole)
         heading = _on_the_fixes_clock(heading, heading.utc_s, fixes.utc_s[known], fix_t_s[known])
     require_overlap(heading.t_s, whole, Clock("host", 0.0, 0.0, 0.0, 2), heading.source)
+    read_rad = yaw_to_enu(heading.yaw_rad, heading.convention or run.vehicle.convention)
+    yaw = np.unwrap(read_rad)
+    turned = heading_by_turning(run, heading, yaw)
+    notices += turned.notices
+    heading = replace(heading, t_s=turned.moved(heading.t_s))
     wheels = _from_first_heading(wheels, heading)
     span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
 
@@ -132,13 +156,26 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     if not timed.any():
         raise DataError("gnss: no fix has a usable time")
     _require_dense(t_s[timed], "gnss", 12 * MOST_PAUSE_S)
-    moved = _clocks_by_motion(run, heading, wheels, t_s, timed)
-    if moved is not None:
-        notices += moved.notices
+    one_clock = run.heading.utc_s is not None
+    if one_clock:
+        t_s, before_t_s, clock = turned.moved(t_s), turned.moved(before_t_s), turned.after(clock)
+    # A receiver without receive times gives no path on the wheels' clock to compare its fixes with.
+    agreed = one_clock and (turned.offset_s != 0.0 or not np.isfinite(fixes.host_t_s).any())
+    path = path_along(heading.t_s, yaw, wheels, run.vehicle)
+    compared = fixes_by_motion(fixes, path, t_s, timed, whole, agreed)
+    notices += compared.notices
+    if (moved := compared.clock) is not None:
         t_s, before_t_s, clock = moved.moved(t_s), moved.moved(before_t_s), moved.after(clock)
+        if one_clock:
+            heading = replace(heading, t_s=moved.moved(heading.t_s))
+            wheels = _from_first_heading(run.wheels, heading)
+            span = (float(wheels.t_s[0]), float(wheels.t_s[-1]))
+        else:
+            notices += told_together(turned, moved)
     clock = replace(clock, offset_at_start_s=_offset_at_start_s(t_s, fixes.utc_s))
     require_overlap(t_s[timed], span, clock, "the fixes")
 
+    timed &= ~compared.old
     good = timed & usable(fixes.quality)
     for code in np.unique(fixes.quality[timed & ~good]):
         count = int((fixes.quality[timed & ~good] == code).sum())
@@ -152,9 +189,12 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     judges = good & within(received_s, windows_on_clock(withhold_s, whole))
     good_index = in_order(t_s, good & ~judges)
     if good_index.size < MIN_MEASUREMENTS:
+        repeated = int(compared.old.sum())
+        beside = f" (and {repeated} that repeat another's position while the wheels go on)" if repeated else ""
+        advice = ", and that its positions change" if repeated else ""
         raise DataError(
-            f"gnss: {good_index.size} usable fixes within the wheels' span of {span[1] - span[0]:.1f} s, "
-            f"at least {MIN_MEASUREMENTS} are needed: log longer, or check the receiver's fix quality"
+            f"gnss: {good_index.size} usable fixes{beside} within the wheels' span of {span[1] - span[0]:.1f} s, "
+            f"at least {MIN_MEASUREMENTS} are needed: log longer, or check the receiver's fix quality{advice}"
         )
 
     seen = _inside(heading.t_s, span, heading.source, notices)
@@ -169,7 +209,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     height = float(np.median(alt[np.isfinite(alt)])) if np.isfinite(alt).any() else 0.0
     origin = good_index[table_sigma_m(quality) <= table_sigma_m(quality).min()][0]
     plane = TangentPlane(float(fixes.lat_deg[origin]), float(fixes.lon_deg[origin]), round(height, 2))
-    placed = in_plane(fixes, t_s, good_index, plane)
+    steps_m = rounding_steps_m(fixes, plane)
+    placed = in_plane(fixes, t_s, good_index, plane, steps_m)
     withheld = [] if not judges.any() else [(fixes, np.where(judges, t_s, np.nan), judges)]
     if run.reference is not None:
         withheld.append((run.reference.fixes, before_t_s, run.reference.lost))
@@ -184,7 +225,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         left_rad=wheels.left_rad - wheels.left_rad[0],
         loose=wheels.loose,
         heading_t_s=heading.t_s[seen],
-        yaw_rad=np.unwrap(yaw_to_enu(heading.yaw_rad[seen], heading.convention or run.vehicle.convention)),
+        yaw_rad=_from_first(yaw[seen], read_rad[seen]),
         yaw_sigma_rad=None if heading.yaw_sigma_rad is None else _without_gaps(heading.yaw_sigma_rad[seen]),
         pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
         roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
@@ -205,6 +246,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         reference=reference_fixes(withheld, span, plane),
         heading_source=heading.source,
         heading_convention=heading.convention,
+        yaw_floor_rad=OF_ROUNDING * step_of(heading.yaw_rad),
+        fix_floor_m=(OF_ROUNDING * steps_m[0], OF_ROUNDING * steps_m[1]),
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
@@ -219,32 +262,10 @@ def _offset_at_start_s(t_s: Floats, utc_s: Floats) -> float | None:
     return float(t_s[first] - utc_s[first])
 
 
-def _clocks_by_motion(
-    run: Run, heading: HeadingStream, wheels: WheelStream, t_s: Floats, timed: Bools
-) -> MotionClock | None:
-    """How the fixes' times have to be moved, where the motion shows that they are clearly off the wheels' clock.
-
-    Where the heading came with the fixes it is on their clock, not on the wheels': there is no path to compare them by.
-    """
-    fixes, vehicle = run.fixes, run.vehicle
-    rows = in_order(t_s, timed & usable(fixes.quality))
-    alone = heading.utc_s is not None and not np.isfinite(fixes.host_t_s).any()
-    if rows.size < MIN_MEASUREMENTS or alone:
-        return None
-    placed = in_plane(fixes, t_s, rows, TangentPlane(float(fixes.lat_deg[rows[0]]), float(fixes.lon_deg[rows[0]]), 0.0))
-    leading = leading_fixes(placed)
-    sigma = float(np.sqrt(np.median((placed.var_east_m2 + placed.var_north_m2)[leading]) / 2.0))
-    every = max(1, round(WHEEL_RATE_HZ**-1 / max(float(np.median(np.diff(wheels.t_s))), 1e-6)))
-    covered = (wheels.t_s >= heading.t_s[0]) & (wheels.t_s <= heading.t_s[-1])
-    index = np.flatnonzero(covered)[::every]
-    if index.size < MIN_MEASUREMENTS:
-        return None
-    yaw = np.unwrap(yaw_to_enu(heading.yaw_rad, heading.convention or vehicle.convention))
-    travel = vehicle.wheel_radius_m * 0.5 * (wheels.right_rad[index] + wheels.left_rad[index])
-    path = wheel_path(wheels.t_s[index], travel, np.interp(wheels.t_s[index], heading.t_s, yaw), vehicle.track_m)
-    span = (float(run.wheels.t_s[0]), float(run.wheels.t_s[-1]))
-    places = (placed.east_m + 1j * placed.north_m)[leading]
-    return clock_by_motion(path, Fixes(placed.t_s[leading], places, sigma), span)
+def _from_first(yaw_rad: Floats, read_rad: Floats) -> Floats:
+    """An unwrapped yaw (h,) that begins with the first reading (h,) as it was read."""
+    turns = round(float(yaw_rad[0] - read_rad[0]) / (2.0 * np.pi))
+    return yaw_rad - 2.0 * np.pi * turns if turns else yaw_rad
 
 
 def _further_columns(*streams: tuple[str, Floats, Mapping[str, Floats]]) -> dict[str, Series]:

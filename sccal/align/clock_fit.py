@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.align.path import laid_out
+from sccal.align.standing import Spans, rows_in_stands
 from sccal.align.whitening import innovations
 from sccal.arrays import Bools, Complexes, Floats, Ints
 
@@ -38,6 +39,9 @@ SLOPE_S = 0.1
 FARTHEST_STEP_S = 2.0
 LARGEST_SKEW = 1.5e-3
 FASTEST_SKEW = 1e-3
+STAND_S = 10.0
+"""Of a stand, at both its ends, in which fixes count: they show when it begins and ends. What lies between, for hours
+perhaps, is the receiver's noise alone, and not the one it has on the way."""
 PRIOR_SKEW = 4e-4
 PRIOR_DRIFT_RADPS = np.radians(3.0) / 3600.0
 PRIOR_SCALE = 0.2
@@ -64,15 +68,17 @@ class WheelPath:
     """(n,), unwrapped."""
     arm_m: float
     """How far from the middle between the wheels an antenna may well be: the prior's sigma."""
+    standing_s: Spans = ()
+    """Stretches in which the wheels stand."""
 
     def mirrored(self) -> WheelPath:
         """As it would be if the yaw counted the other way round."""
-        return WheelPath(self.t_s, np.conj(self.path_m), -self.yaw_rad, self.arm_m)
+        return WheelPath(self.t_s, np.conj(self.path_m), -self.yaw_rad, self.arm_m, self.standing_s)
 
 
-def wheel_path(t_s: Floats, travel_m: Floats, yaw_rad: Floats, arm_m: float) -> WheelPath:
+def wheel_path(t_s: Floats, travel_m: Floats, yaw_rad: Floats, arm_m: float, standing_s: Spans = ()) -> WheelPath:
     """The path of signed cumulative travel (n,) along a yaw (n,), both at t_s."""
-    return WheelPath(t_s, laid_out(travel_m, yaw_rad), yaw_rad, arm_m)
+    return WheelPath(t_s, laid_out(travel_m, yaw_rad), yaw_rad, arm_m, standing_s)
 
 
 @dataclass(frozen=True)
@@ -219,6 +225,9 @@ def _columns(
     since = fixes.t_s - fixes.middle_s
     t = fixes.t_s + (offset_s + skew * since)
     inside = (t >= wheels.t_s[0] + SLOPE_S) & (t <= wheels.t_s[-1] - SLOPE_S)
+    covered = float(inside.mean())
+    long = tuple((begin + STAND_S, end - STAND_S) for begin, end in wheels.standing_s if end - begin > 2.0 * STAND_S)
+    inside[rows_in_stands(t, long)[0]] = False
     if int(inside.sum()) < FEWEST_CELLS:
         return None
     t, since, z = t[inside], since[inside], fixes.z_m[inside]
@@ -227,7 +236,7 @@ def _columns(
     slope = (after - before) / (2.0 * SLOPE_S)
     turn = np.exp(1j * np.interp(t, wheels.t_s, wheels.yaw_rad))
     bent = np.concatenate(([0.0], np.cumsum(0.5 * (since[1:] + since[:-1]) * np.diff(p))))
-    return z, p, slope, turn, bent, since, fixes.t_s[inside], float(inside.mean())
+    return z, p, slope, turn, bent, since, fixes.t_s[inside], covered
 
 
 def _cells(t_s: Floats, rows: Complexes, left: Complexes) -> tuple[Complexes, Floats] | None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from sccal.align.accuracy import fix_covariance, usable
 from sccal.align.clocks import Clock, fixes_on_host_clock
+from sccal.align.digits import OF_ROUNDING, step_of
 from sccal.arrays import Bools, Floats, Ints
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import FixStream, Notice, Reference
@@ -42,13 +43,30 @@ class ReferenceFixes:
     """(n,) of the quality that carries most of the information: the ones to judge by."""
 
 
-def in_plane(fixes: FixStream, t_s: Floats, rows: Ints, plane: TangentPlane) -> PlaneFixes:
-    """The fixes at the indices ``rows``, which are in order of their times on the logging clock ``t_s`` (n,)."""
+def in_plane(
+    fixes: FixStream, t_s: Floats, rows: Ints, plane: TangentPlane, steps_m: tuple[float, float] | None = None
+) -> PlaneFixes:
+    """The fixes at the indices ``rows``, which are in order of their times on the logging clock ``t_s`` (n,).
+
+    No variance is below that of the coordinates' rounding; steps_m as from rounding_steps_m, where known already.
+    """
     east, north = plane.to_east_north(fixes.lat_deg[rows], fixes.lon_deg[rows])
     var_east, var_north, cov = fix_covariance(
         fixes.quality[rows], fixes.sigma_east_m[rows], fixes.sigma_north_m[rows], fixes.cov_en_m2[rows]
     )
+    steps = rounding_steps_m(fixes, plane) if steps_m is None else steps_m
+    least_east, least_north = ((OF_ROUNDING * step) ** 2 for step in steps)
+    var_east, var_north = np.maximum(var_east, least_east), np.maximum(var_north, least_north)
     return PlaneFixes(t_s[rows], east, north, fixes.quality[rows], var_east, var_north, cov)
+
+
+def rounding_steps_m(fixes: FixStream, plane: TangentPlane) -> tuple[float, float]:
+    """The steps east and north (m) to which the log rounds its coordinates; 0 where it does not."""
+    of_lon, of_lat = step_of(fixes.lon_deg), step_of(fixes.lat_deg)
+    east, north = plane.to_east_north(
+        np.array([plane.lat_deg, plane.lat_deg + of_lat]), np.array([plane.lon_deg + of_lon, plane.lon_deg])
+    )
+    return float(abs(east[0])), float(abs(north[1]))
 
 
 def in_order(t_s: Floats, good: Bools) -> Ints:

@@ -2,6 +2,7 @@
 
 The *cumulative* wheel angle is interpolated to each event's own time, so the state is predicted exactly to it. Using
 the last encoder sample instead leaves the state up to one sample stale, which looks like a latency of the heading.
+While the robot stands hardly anything is an event but the outputs (see standing).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 
 from sccal.align.aligned import Aligned
 from sccal.align.denoise import denoised_angles
+from sccal.align.standing import DITHER_M, worth_taking
 from sccal.arrays import Floats, Ints, Rows
 
 LOOSE_FRACTION = 0.25
@@ -60,20 +62,27 @@ def build_timeline(
     """Events of the run, or of the part of it between two times.
 
     Readings of the AHRS come faster than its error changes; the ones beyond heading_rate_hz would only pretend to be
-    independent. wheel_rate_hz thins the pure prediction events, for passes that need no fine path.
+    independent, and so would those of a robot that stands. wheel_rate_hz thins the pure prediction events, for passes
+    that need no fine path.
     """
     first, last = aligned.span_s
     if between_s is not None:
         first, last = max(first, between_s[0]), min(last, between_s[1])
 
-    heading_index = _within(aligned.heading_t_s, first, last, thin(aligned.heading_t_s, heading_rate_hz))
-    fix_index = _within(aligned.fix_t_s, first, last, thin(aligned.fix_t_s, fix_rate_hz))
-    wheel_index = _within(aligned.wheel_t_s, first, last, thin(aligned.wheel_t_s, wheel_rate_hz))
+    def chosen(t_s: Floats, rate_hz: float, *columns: Floats) -> Ints:
+        index = _within(t_s, first, last, thin(t_s, rate_hz))
+        taken = worth_taking(t_s[index], aligned.standing_s, first, *(column[index] for column in columns))
+        return np.asarray(index[taken])
+
+    heading_index = chosen(aligned.heading_t_s, heading_rate_hz, aligned.yaw_rad)
+    fix_index = _without_held(aligned, chosen(aligned.fix_t_s, fix_rate_hz, aligned.fix_east_m, aligned.fix_north_m))
+    wheel_index = chosen(aligned.wheel_t_s, wheel_rate_hz)
     heading_t, fix_t = aligned.heading_t_s[heading_index], aligned.fix_t_s[fix_index]
     out_t = np.arange(np.ceil(first * output_rate_hz), np.floor(last * output_rate_hz) + 1) / output_rate_hz
     out_t = out_t[(out_t >= first) & (out_t <= last)]
 
-    t_s = np.unique(np.concatenate(([first, last], aligned.wheel_t_s[wheel_index], heading_t, fix_t, out_t)))
+    starts_t = np.array([end for _, end in aligned.standing_s if first < end < last])
+    t_s = np.unique(np.concatenate(([first, last], aligned.wheel_t_s[wheel_index], starts_t, heading_t, fix_t, out_t)))
     return Timeline(
         t_s=t_s,
         right_rad=_steps(t_s, aligned.wheel_t_s, aligned.right_rad),
@@ -97,6 +106,19 @@ def clear_steps(aligned: Aligned, timeline: Timeline, right_over_left: float) ->
         aligned.wheel_t_s[part], aligned.right_rad[part], aligned.left_rad[part], right_over_left
     )
     return _steps(timeline.t_s, grid, right), _steps(timeline.t_s, grid, left)
+
+
+def _without_held(aligned: Aligned, index: Ints) -> Ints:
+    """The fixes at the indices without those that repeat the one before while the robot stays where it is.
+
+    A receiver may hold its position during a pivot or a short stop, and would seem to have no noise.
+    """
+    east, north = aligned.fix_east_m[index], aligned.fix_north_m[index]
+    same = (np.diff(east) == 0.0) & (np.diff(north) == 0.0)
+    if not same.any():
+        return index
+    travel = np.interp(aligned.fix_t_s[index], aligned.wheel_t_s, aligned.travel_m)
+    return np.asarray(index[np.concatenate(([True], ~same | (np.abs(np.diff(travel)) > DITHER_M)))])
 
 
 def _within(t_s: Floats, first: float, last: float, index: Ints) -> Ints:

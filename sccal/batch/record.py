@@ -23,7 +23,7 @@ from sccal.calibration.result import Calibration, Fixes, History, Provenance, Re
 from sccal.calibration.shared import SharedLikelihood
 
 RECORD_FILE = ".sccal.json"
-SCHEMA = "sccal.record/1"
+SCHEMA = "sccal.record/2"
 
 
 @dataclass(frozen=True)

@@ -22,17 +22,21 @@ from sccal.align import align
 from sccal.arrays import Floats
 from sccal.batch.record import FileMark, RunRecord, key_of, light, record_from, record_text
 from sccal.batch.remote import RemoteRun, fetched
+from sccal.calibration.beside_small import judged_held_out, model_of_run, widened
+from sccal.calibration.by_the_others import SaidByOthers, windows_by_others
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Provenance
+from sccal.calibration.result import OutageWindow, Provenance
+from sccal.calibration.saved_model import SavedModel, check_vehicle, notices_on_vehicle
 from sccal.calibration.shared import SharedLikelihood, own_answer
 from sccal.calibration.single import calibrate_run, prepare
-from sccal.diagnose.honest import with_honest_effects
 from sccal.errors import SccalError, as_known
-from sccal.filter.forward import Noise
 from sccal.filter.iterate import RunProblem
+from sccal.filter.levels import Noise
 from sccal.logs.inputs import input_files
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run
+from sccal.logs.streams import Run
+from sccal.report.model_json import digest_of
 from sccal.report.write import write_calibration
 
 COMPUTING = ("numpy", "scipy", "numba")
@@ -96,13 +100,18 @@ class CalibrateRun:
         key = key_of(source.name, provenance)
         if key == self.standing_key:
             return Done()
-        calibration, problem = calibrate_run(read_run(source, self.read), self.options)
-        calibration = replace(calibration, provenance=provenance)
+        calibration, problem = calibrate_run(self._read(source), self.options)
+        model = model_of_run(calibration, problem, self.options.heading_rate_hz)
         likelihood = None
-        if self.options.effects:
-            calibration = with_honest_effects(calibration, problem)
-        else:
+        if not self.options.has_effects:
             likelihood = SharedLikelihood.of(problem, own_answer(calibration))
+        calibration = replace(
+            calibration,
+            effects=widened(calibration.effects, model),
+            held_out=judged_held_out(model, self.options.outage_window_s),
+            notices=(*calibration.notices, *notices_on_vehicle(self.options.model, calibration.vehicle)),
+            provenance=provenance,
+        )
         with tempfile.TemporaryDirectory(prefix="sccal-") as scratch:
             write_calibration(calibration, Path(scratch), self.also.mcap, self.also.pdf)
             files = {path.name: path.read_bytes() for path in sorted(Path(scratch).iterdir())}
@@ -110,6 +119,11 @@ class CalibrateRun:
         # As a later call would read it, so that nothing depends on which call it was.
         record = record_from(record_text(RunRecord(key, light(calibration), likelihood, marks)))
         return Done(record, files)
+
+    def _read(self, source: RunSource) -> Run:
+        run = read_run(source, self.read)
+        check_vehicle(self.options.model, run.vehicle)
+        return run
 
 
 @dataclass(frozen=True)
@@ -128,6 +142,27 @@ class LineariseAgain:
         try:
             with one_thread(), fetched(self.source) as source:
                 return SharedLikelihood.of(prepared_again(source, self.options, self.read, self.noise), self.at)
+        except Exception as error:
+            return as_known(error)
+
+
+@dataclass(frozen=True)
+class JudgeByOthers:
+    """How far a calibrated run without effects drifts without fixes by what the other runs of its vehicle say."""
+
+    source: Source
+    options: CalibrationOptions
+    read: ReadOptions
+    noise: Noise
+    said: SaidByOthers
+
+    def __call__(self) -> tuple[OutageWindow, ...] | SccalError:
+        """The windows, or why there is no answer."""
+        try:
+            with one_thread(), fetched(self.source) as source:
+                problem = prepared_again(source, self.options, self.read, self.noise)
+                options = self.options
+                return windows_by_others(problem, self.said, options.heading_rate_hz, options.outage_window_s)
         except Exception as error:
             return as_known(error)
 
@@ -169,7 +204,9 @@ def _named(options: Any, prefix: str = "") -> dict[str, str]:
     named: dict[str, str] = {}
     for one in fields(options):
         value = getattr(options, one.name)
-        if is_dataclass(value) and one.name == "filter":
+        if isinstance(value, SavedModel):
+            named[one.name] = digest_of(value)
+        elif is_dataclass(value) and one.name == "filter":
             named.update(_named(value))
         elif is_dataclass(value):
             named.update(_named(value, f"{prefix}{one.name}_"))

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sccal.batch.processes import Crew
 from sccal.batch.record import RunRecord
 from sccal.batch.remote import fetched
-from sccal.batch.tasks import CalibrateRun, LineariseAgain, one_thread, prepared_again
+from sccal.batch.tasks import CalibrateRun, JudgeByOthers, LineariseAgain, one_thread, prepared_again
+from sccal.calibration.beside_small import judged_held_out, model_of_vehicle, widened
+from sccal.calibration.by_the_others import SaidByOthers, held_out_of
 from sccal.calibration.combine import combine, combined, only_run
-from sccal.calibration.result import VehicleCalibration
+from sccal.calibration.result import HeldOut, OutageWindow, VehicleCalibration
 from sccal.calibration.shared import MAX_ROUNDS, SharedFit, SharedLikelihood, far_off, pooled, stayed
-from sccal.diagnose.honest import with_honest_vehicle
 from sccal.errors import SccalError
 
 
@@ -38,7 +39,8 @@ def vehicle_of_runs(members: Sequence[Member], crew: Crew) -> VehicleCalibration
     with one_thread():
         if len(likelihoods) < len(members):
             return _with_effects(members)
-        return combined(runs, members[0].task.options.filter, _joint(members, likelihoods, crew))
+        vehicle = combined(runs, members[0].task.options.filter, _joint(members, likelihoods, crew))
+        return replace(vehicle, held_out=_held_out(members, likelihoods, crew))
 
 
 def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], crew: Crew) -> SharedFit:
@@ -63,6 +65,27 @@ def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], crew:
     return fit
 
 
+def _held_out(members: Sequence[Member], likelihoods: Sequence[SharedLikelihood], crew: Crew) -> HeldOut | None:
+    """Every run judged by the others, opened again by whoever does the work."""
+    runs = [one.record.calibration for one in members]
+    tasks = [
+        JudgeByOthers(
+            one.task.source,
+            one.task.options,
+            one.task.read,
+            one.record.calibration.noise,
+            SaidByOthers.of(likelihoods, runs, place),
+        )
+        for place, one in enumerate(members)
+    ]
+    windows: list[tuple[OutageWindow, ...]] = [()] * len(members)
+    for place, found in crew.each(tasks):
+        if isinstance(found, SccalError):
+            raise type(found)(f"{members[place].task.source.name}: {found}")
+        windows[place] = found
+    return held_out_of(windows, members[0].task.options.outage_window_s)
+
+
 def _with_effects(members: Sequence[Member]) -> VehicleCalibration:
     """All runs prepared again at once, by the noise that they were found to have."""
     with ExitStack() as stack:
@@ -71,5 +94,11 @@ def _with_effects(members: Sequence[Member]) -> VehicleCalibration:
             source = stack.enter_context(fetched(one.task.source))
             noise = one.record.calibration.noise
             problems.append(prepared_again(source, one.task.options, one.task.read, noise))
+        options = members[0].task.options
         vehicle = combine([one.record.calibration for one in members], problems)
-        return with_honest_vehicle(vehicle, problems)
+        model = model_of_vehicle(vehicle, problems, options.heading_rate_hz)
+        return replace(
+            vehicle,
+            effects=widened(vehicle.effects, model),
+            held_out=judged_held_out(model, options.outage_window_s),
+        )

@@ -7,11 +7,12 @@ from typing import Protocol
 
 import numpy as np
 
-from sccal.arrays import Floats, Ints
-from sccal.calibration.joint import fit_jointly, is_free, shared_places
+from sccal.arrays import Floats
 from sccal.calibration.outage import summarise
 from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
-from sccal.calibration.status import judge
+from sccal.calibration.status import effect_estimates, judge
+from sccal.evidence.extension import Free, FreeEffects
+from sccal.evidence.joint import JointFit, fit_jointly
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
@@ -22,21 +23,29 @@ OFFSET_OF_THE_RUN_RAD = np.radians(5.0)
 
 
 def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> VehicleCalibration:
-    """One result for all runs of a vehicle; runs and problems belong together, one or more."""
-    first = problems[0]
+    """One result for all runs of a vehicle; runs and problems belong together, one or more.
+
+    The runs may have different effects: what belongs to one run, and columns that only some of them log.
+    """
     if len(runs) == 1:
         return only_run(runs[0])
-    shared = shared_places(first)
     own = [_own_values(run, problem) for run, problem in zip(runs, problems, strict=True)]
-    fit = fit_jointly(problems, [At(Constants.of(theta), theta[3:]) for theta in own])
-    effects = _shared_effects(first, shared, fit.mode, fit.robust)
-    return combined(runs, first.options, fit, effects)
+    fit = fit_jointly(problems, [At(Constants.of(theta), theta[3:]) for theta in own], with_stretches=True)
+    return combined(runs, problems[0].options, fit, _shared_effects(problems, fit))
 
 
 def only_run(run: Calibration) -> VehicleCalibration:
     """The vehicle's result where there is one run."""
     return VehicleCalibration(
-        run.vehicle, run.with_offset, (run,), run.parameters, run.fit, run.outage, None, effects=run.effects
+        run.vehicle,
+        run.with_offset,
+        (run,),
+        run.parameters,
+        run.fit,
+        run.outage,
+        None,
+        effects=run.effects,
+        held_out=run.held_out,
     )
 
 
@@ -98,30 +107,31 @@ def combined(
     )
 
 
-def _shared_effects(
-    problem: RunProblem, shared: Ints, values: Floats, covariance: Floats
-) -> dict[str, dict[str, Estimate]]:
+def _shared_effects(problems: Sequence[RunProblem], fit: JointFit) -> dict[str, dict[str, Estimate]]:
     """The vehicle's share of the effects; what belongs to runs stands in the runs' own results."""
-    if not is_free(problem.extension):
-        return {}
-    count = problem.extra
-    whole, spread = np.zeros(count), np.zeros((count, count))
-    places = shared[3:] - 3
-    whole[places] = values[3:]
-    spread[np.ix_(places, places)] = covariance[3:, 3:]
-    kept = {(effect.name, one.name) for k, (effect, one) in enumerate(problem.extension.parameters) if k in places}
-    found = problem.extension.estimates(whole, spread)
-    named = {
-        name: {one: estimate for one, estimate in parameters.items() if (name, one) in kept}
-        for name, parameters in found.items()
-    }
-    return {name: parameters for name, parameters in named.items() if parameters}
+    free: dict[str, Free] = {}
+    for problem in problems:
+        if isinstance(problem.extension, FreeEffects):
+            free |= {one.key: one for one in problem.extension.effects if one.key not in free}
+    places = {key[:2]: place for place, key in enumerate(fit.places.keys[: fit.places.shared])}
+    sigmas = np.sqrt(np.diag(fit.robust))
+    found: dict[str, dict[str, Estimate]] = {}
+    for key, one in free.items():
+        mine = [places.get((key, parameter.name)) for parameter in one.parameters]
+        if all(place is None for place in mine):
+            continue
+        values = np.array([0.0 if place is None else fit.mode[place] for place in mine])
+        spread = np.array([0.0 if place is None else sigmas[place] for place in mine])
+        ((name, estimates),) = effect_estimates(FreeEffects((one,)), values, np.diag(spread**2)).items()
+        of_vehicle = {parameter.name for parameter in one.effect.parameters if parameter.scope == "vehicle"}
+        found[name] = {parameter: estimate for parameter, estimate in estimates.items() if parameter in of_vehicle}
+    return found
 
 
 def _own_values(run: Calibration, problem: RunProblem) -> Floats:
     """The run's own estimates of R_r, R_l, L and the effects' parameters (3 + m,)."""
     p = run.parameters
-    effects = problem.extension.parameters if is_free(problem.extension) else ()
+    effects = problem.extension.parameters if isinstance(problem.extension, FreeEffects) else ()
     return np.array(
         [
             p.radius_right_m.value,

@@ -11,7 +11,7 @@ from typing import Literal
 
 from sccal.align.clocks import Clock
 from sccal.arrays import Bools, Floats, Ints
-from sccal.filter.forward import Noise
+from sccal.filter.levels import Noise
 from sccal.logs.inputs import InputFile
 from sccal.logs.streams import Notice, Vehicle
 
@@ -25,9 +25,11 @@ __all__ = [
     "Estimate",
     "Fit",
     "Fixes",
+    "HeldOut",
     "History",
     "InputFile",
     "Manoeuvre",
+    "Missing",
     "Noise",
     "Outage",
     "OutageWindow",
@@ -140,6 +142,28 @@ class Unseen:
     """What its standard deviation would be, were it estimated."""
     smallest: float
     """Smallest size that would stand out."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """An effect that the model lacks, as a quick look sees it: a diagnosis would name it."""
+
+    effect: str
+    title: str
+    evidence_nats: float
+    """Logarithm of the odds for it."""
+    size: float
+    """Largest parameter in units of the smallest size that matters."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Drift without fixes on data that fitted neither constants nor effects."""
+
+    outage_rms_m: float | None
+    outage_end_rms_m: float | None
+    how: str
+    """Which data judged, and which fitted, in words."""
 
 
 @dataclass(frozen=True)
@@ -309,6 +333,10 @@ class Calibration:
     causes: tuple[Cause, ...] = ()
     consistency: tuple[Consistency, ...] = ()
     manoeuvres: tuple[Manoeuvre, ...] = ()
+    missing: tuple[Missing, ...] = ()
+    """What the model seems to lack, the strongest first."""
+    held_out: HeldOut | None = None
+    """By stretches of the run; None where it is too short to leave any out."""
 
 
 @dataclass(frozen=True)
@@ -327,3 +355,5 @@ class VehicleCalibration:
     """Disagreement of the runs about the shared parameters, over what their sigmas allow; None for one run."""
     notices: tuple[Notice, ...] = ()
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    held_out: HeldOut | None = None
+    """The same quantity as before and after of a diagnosis; None where no run is long enough to leave stretches out."""

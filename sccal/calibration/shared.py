@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sccal.arrays import Floats, Ints
-from sccal.calibration.joint import RunLikelihood, at_least, between_runs, disagreement
+from sccal.arrays import Floats
 from sccal.calibration.result import Calibration
+from sccal.evidence.joint import RunLikelihood, at_least, between_runs, disagreement
 from sccal.filter.forward import numeric_limits
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
@@ -22,7 +22,6 @@ from sccal.filter.start import Constants
 FAR_SIGMAS = 3.0
 STAYED_SIGMAS = 0.05
 MAX_ROUNDS = 4
-_SHARED: Ints = np.arange(3)
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,9 @@ class SharedLikelihood:
     @classmethod
     def of(cls, problem: RunProblem, at: Floats) -> SharedLikelihood:
         """Of a run without effects, linearised at R_r, R_l and L."""
-        found = RunLikelihood.of(problem, At(Constants.of(at), np.zeros(0)), _SHARED)
-        return cls(found.precision, found.vector, found.covariance, problem.prior, problem.prior_mean, at)
+        found = RunLikelihood.of(problem, At(Constants.of(at), np.zeros(0)))
+        covariance = found.path.final_covariance[3:6, 3:6]
+        return cls(found.precision, found.vector, covariance, problem.prior, problem.prior_mean, at)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ gives the history of the parameters and the outage figures. The constants themse
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from sccal.align.clocks import DAY_S, ERA_S
 from sccal.arrays import Floats
 from sccal.calibration.causes import find_causes
 from sccal.calibration.consistency import consistency_over_time
-from sccal.calibration.extension import FreeEffects
 from sccal.calibration.manoeuvres import describe_manoeuvres
+from sccal.calibration.missing import look_for_missing
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import run_with_outages
 from sccal.calibration.reference import judged_forward
@@ -30,11 +31,13 @@ from sccal.calibration.result import (
     Residuals,
     Trajectory,
 )
-from sccal.calibration.status import judge
+from sccal.calibration.status import effect_estimates, judge
 from sccal.calibration.unseen import unseen_parameters
+from sccal.evidence.extension import FreeEffects
+from sccal.evidence.model import Accepted, bare_model, refitted
 from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem, iterate, reported_covariance, reported_values
-from sccal.filter.noise import estimate_noise
+from sccal.filter.noise import Reach, estimate_noise
 from sccal.filter.start import ODD_SCALE, Constants, find_start
 from sccal.logs.streams import Notice, Run
 
@@ -48,17 +51,25 @@ LATEST_UTC_S = 4102444800.0
 
 def prepare(aligned: Aligned, options: CalibrationOptions) -> RunProblem:
     """Find the start and the noise of one aligned run. Raises DataError where that is impossible."""
-    start = find_start(aligned)
-    noise = options.noise
-    extension = FreeEffects.named(options.effects, aligned)
-    if noise is None:
-        noise = estimate_noise(aligned, start, options.filter, options.heading_rate_hz, extension)
+    extension = options.extension(aligned)
+    start, noise = find_start(aligned), options.noise_of(aligned.name)
+    if noise is None and not isinstance(extension, FreeEffects):
+        noise, _ = estimate_noise(aligned, start, options.filter, options.heading_rate_hz)
+    elif noise is None:
+        assert isinstance(extension, FreeEffects)
+        # The effects come near under the noise of a model without them, and the noise is searched for beside them.
+        bare = bare_model([aligned], options.filter, options.heading_rate_hz)
+        accepted = [Accepted(free) for free in extension.effects]
+        noise = refitted(bare, accepted, reach=Reach.FEW).problems[0].noise
     timeline = build_timeline(aligned, options.output_rate_hz, options.heading_rate_hz)
     return RunProblem(aligned, timeline, start, noise, options.filter, extension)
 
 
 def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, RunProblem]:
-    """Calibrate one run. Raises DataError where the data cannot support it."""
+    """Calibrate one run. Raises DataError where the data cannot support it.
+
+    Returns what was found, and the problem that it solves: with measurements weighed softly, as all estimates are.
+    """
     aligned = align(run, options.withhold_s)
     del run  # an hour of raw streams is not needed any more, and as large as all that follows
     problem = prepare(aligned, options)
@@ -72,6 +83,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     else:
         honest, outage, judged = judged_forward(problem, options)
 
+    problem = replace(problem, options=replace(options.filter, soft_gate=True))
     learnt = reported_values(honest)
     values, final = iterate(problem, At(Constants.of(learnt), learnt[4:], honest))
     covariance = reported_covariance(final)
@@ -105,6 +117,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             causes=find_causes(problem, final, values, start.moving_from_s + SETTLED_S),
             consistency=consistency_over_time(problem, final),
             manoeuvres=describe_manoeuvres(aligned, values),
+            missing=look_for_missing(problem, values, options.heading_rate_hz),
         ),
         problem,
     )
@@ -123,7 +136,7 @@ def _started_utc_s(aligned: Aligned) -> float | None:
 
 def _effects(problem: RunProblem, values: Floats, covariance: Floats) -> dict[str, dict[str, Estimate]]:
     extension = problem.extension
-    return extension.estimates(values, covariance) if isinstance(extension, FreeEffects) else {}
+    return effect_estimates(extension, values, covariance) if isinstance(extension, FreeEffects) else {}
 
 
 def measure_fit(problem: RunProblem, found: ForwardPass) -> Fit:

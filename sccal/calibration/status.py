@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Drive, Estimate, Parameters
-from sccal.filter.forward import Noise, prior_covariance
+from sccal.calibration.result import Drive, Estimate, Parameters, Status
+from sccal.effects.effect import Effect, Parameter
+from sccal.evidence.extension import FreeEffects
+from sccal.filter.forward import prior_covariance
+from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.logs.streams import Vehicle
@@ -76,3 +79,27 @@ def _why_unobserved(name: str, drive: Drive) -> str:
     if name == "track":
         return f"the track cannot be seen in this run ({did}): spin in place both ways, or drive arcs to both sides"
     return f"the {name} cannot be told from the other constants in this run ({did}): drive straight and turn both ways"
+
+
+def effect_estimates(extension: FreeEffects, values: Floats, covariance: Floats) -> dict[str, dict[str, Estimate]]:
+    """What was found, by effect and parameter; values (m,) and covariance (m, m) in file units."""
+    found: dict[str, dict[str, Estimate]] = {}
+    sigmas = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    for (effect, one), value, sigma in zip(extension.parameters, values.tolist(), sigmas.tolist(), strict=True):
+        found.setdefault(effect.name, {})[one.name] = _judge_effect(effect, one, value, sigma)
+    for free in extension.effects:
+        for name, shape in free.shapes.items():
+            found.setdefault(free.effect.name, {})[name] = Estimate(float(shape), float("nan"), "held", "searched for")
+    return found
+
+
+def _judge_effect(effect: Effect, parameter: Parameter, value: float, sigma: float) -> Estimate:
+    status: Status = "estimated"
+    reason = ""
+    if sigma > UNOBSERVED_RATIO * parameter.prior_sigma:
+        status = "unobserved"
+        reason = f"this drive does not show {effect.name} {parameter.name}: {effect.excited_by}"
+    elif not parameter.lower < value < parameter.upper:
+        status = "at_bound"
+        reason = f"{effect.name} {parameter.name} beyond {parameter.lower:g} … {parameter.upper:g} {parameter.unit}"
+    return Estimate(value, sigma, status, reason, None, parameter.prior_sigma)

@@ -1,7 +1,6 @@
 """What these data cannot show: an antenna off the middle and late fixes, if fixes are coarse or the drive is plain.
 
-Nothing is estimated here. One pass carries the filter's sensitivity to each parameter held at zero; the information it
-gathers gives the standard deviation that an estimate would have.
+Nothing is estimated here. One pass with these effects free tells the standard deviation that an estimate would have.
 """
 
 from __future__ import annotations
@@ -12,30 +11,26 @@ import numpy as np
 
 from sccal.align import Timeline, build_timeline
 from sccal.arrays import Floats
-from sccal.calibration.extension import Free, FreeEffects, view_run
 from sccal.calibration.result import Unseen
-from sccal.effects.catalogue import effect_named
+from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
-from sccal.filter.columns import Placed, kernel_columns
+from sccal.evidence.extension import Free, FreeEffects
 from sccal.filter.iterate import At, RunProblem
-from sccal.filter.scoring import score
 from sccal.filter.start import Constants
 
-ASKED = ("lever_arm", "gnss_latency")
-"""What every robot with a receiver has some of, and what good fixes show and bad ones do not."""
 FIRST_LOOK_S = 600.0
 STANDS_OUT = 6.75
 """Sigmas at which a parameter that nobody asked for is beyond doubt: those of a finding, and half as much again."""
 
 
 def unseen_parameters(problem: RunProblem, values: Floats) -> tuple[Unseen, ...]:
-    """Parameters of ASKED that would have to be larger than their priors allow to be seen; values (4 + m,) as found.
+    """Parameters that every robot has some of, and that would have to be larger than their priors to be seen.
 
-    Those that the filter estimates already are left out: they have a status of their own.
+    ``values`` (4 + m,) are those found. What the filter estimates already is left out: it has a status of its own.
     """
     extension = problem.extension
     free = {effect.name for effect, _ in extension.parameters} if isinstance(extension, FreeEffects) else set()
-    asked = [effect_named(name) for name in ASKED if name not in free]
+    asked = [effect for effect in CATALOGUE.values() if effect.on_every_robot and effect.name not in free]
     if not asked:
         return ()
     first, last = problem.aligned.span_s
@@ -70,18 +65,11 @@ def _unseen(asked: list[Effect], sigmas: Floats) -> tuple[Unseen, ...]:
 
 def _sigmas(problem: RunProblem, values: Floats, asked: list[Effect]) -> Floats:
     """Posterior standard deviations (k,) of the asked effects' parameters, all of them free beside the model."""
-    at = At(Constants.of(values), values[4:])
-    clear = problem.clear_steps(at.constants)
-    view = view_run(problem, at, clear)
-    placed: list[Placed] = []
-    priors: list[float] = []
-    for effect in asked:
-        parameters = Free(effect).parameters
-        placed += Free(effect).placed(view, [0.0] * len(parameters), len(priors))
-        priors += [one.prior_sigma for one in parameters]
-    run = problem.begun(at, True, clear)
-    columns = kernel_columns(placed, problem.timeline)
-    block = np.zeros(problem.timeline.t_s.size, dtype=np.int32)
-    found = score(run.events, run.columns, columns, len(priors), run.model, run.x, run.P, block)
-    information = found.information[0] + np.diag(1.0 / np.array(priors) ** 2)
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+    known = problem.extension.effects if isinstance(problem.extension, FreeEffects) else ()
+    extension = FreeEffects((*known, *(Free(effect) for effect in asked)))
+    whole = replace(problem, extension=extension)
+    count = len(extension.parameters) - (values.size - 4)
+    at = At(Constants.of(values), np.concatenate((values[4:], np.zeros(count))))
+    run = whole.begun(at, True, with_sigmas=False)
+    run.run_to()
+    return np.asarray(np.sqrt(np.diag(run.belief.params)[-count:]))

@@ -50,6 +50,13 @@ def calibrate(
     effects: Annotated[
         str, typer.Option(help="Estimate these effects too, e.g. lever_arm,soft_iron (see `sccal effects`).")
     ] = "",
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            help="Estimate the effects of this model.json of `sccal diagnose`, in its shapes and with its noise.",
+            show_default=False,
+        ),
+    ] = None,
     withhold: Annotated[
         list[str] | None,
         typer.Option(help="Withhold the fixes from 60 to 120 s, say, and tell how far the robot drifts (repeatable)."),
@@ -100,9 +107,11 @@ def calibrate(
     from sccal.filter.options import FilterOptions
     from sccal.gates.asked import read_asked
     from sccal.logs.windows import parse_window
+    from sccal.report.model_json import read_model
 
     lines = sys.stderr if as_json else sys.stdout
     try:
+        judged_model = None if model is None else read_model(model)
         options = CalibrationOptions(
             filter=FilterOptions(
                 with_offset=not no_offset,
@@ -118,9 +127,11 @@ def calibrate(
             output_rate_hz=rate,
             heading_rate_hz=heading_rate,
             effects=estimated,
+            model=judged_model,
             withhold_s=tuple(parse_window(text) for text in withhold or []),
         )
-        asked = read_asked(gate or [], baseline, allow_drift or [], estimated)
+        expected = () if judged_model is None else tuple(one.name for one in judged_model.effects)
+        asked = read_asked(gate or [], baseline, allow_drift or [], (*estimated, *expected))
         with progress_on(lines) as bar, redirect_stdout(lines):
             teller = _Teller(bar)
             batch = calibrate_paths(

@@ -31,13 +31,16 @@ def diagnose(
     require_any_log(paths)
     from sccal.batch import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
-    from sccal.report.diagnosis_text import diagnosis_text
+    from sccal.report.diagnosis_text import diagnosis_text, next_line
+    from sccal.results.model import MODEL_FILE
 
     options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
     diagnosed, failures = diagnose_paths(paths, out, options, read)
     width = columns()
+    alone = len(diagnosed) == 1
     for diagnosis, page in diagnosed:
         print(diagnosis_text(diagnosis, width), end="")
         print()
         print(f"results in {page.parent}/, report: {page}")
+        print(next_line(diagnosis, [str(path) for path in paths] if alone else [], str(page.with_name(MODEL_FILE))))
     tell_failures(failures, len(failures) + sum(len(diagnosis.runs) for diagnosis, _ in diagnosed))

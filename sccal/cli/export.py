@@ -18,7 +18,7 @@ def export(
     result: Annotated[
         Path | None,
         typer.Argument(
-            help="A run's folder of results, as OUT/run; for formats of parameters also OUT or vehicle.json.",
+            help="A run's folder of results, as OUT/run; for formats of parameters also vehicle.json or model.json.",
             show_default=False,
         ),
     ] = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Literal
 
 from sccal.compare.pairs import pairs_of
 from sccal.compare.result import Comparison, Figure, FoundEffect, Side
@@ -45,14 +46,21 @@ def compare_diagnoses(a: SavedDiagnosis, b: SavedDiagnosis, sigmas: float) -> Co
 
 def _found(effect: str, a: SavedDiagnosis, b: SavedDiagnosis) -> FoundEffect:
     in_a, in_b = a.findings.get(effect), b.findings.get(effect)
-    nats_a = in_a.held_out_gain_nats if in_a else None
-    nats_b = in_b.held_out_gain_nats if in_b else None
-    if in_a and in_b:
-        return FoundEffect(effect, "kept", nats_a, nats_b, "")
-    if in_a:
-        return FoundEffect(effect, "lost", nats_a, None, _why_absent(effect, in_a.parameters, "B", a, b))
-    parameters = in_b.parameters if in_b else {}
-    return FoundEffect(effect, "gained", None, nats_b, _why_absent(effect, parameters, "A", b, a))
+    change: Literal["gained", "lost", "kept"] = "kept"
+    reason = ""
+    if in_a is None and in_b is not None:
+        change, reason = "gained", _why_absent(effect, in_b.parameters, "A", b, a)
+    elif in_b is None and in_a is not None:
+        change, reason = "lost", _why_absent(effect, in_a.parameters, "B", a, b)
+    return FoundEffect(
+        effect,
+        change,
+        None if in_a is None else in_a.evidence_nats,
+        None if in_b is None else in_b.evidence_nats,
+        None if in_a is None else in_a.held_out_gain_nats,
+        None if in_b is None else in_b.held_out_gain_nats,
+        reason,
+    )
 
 
 def _why_absent(

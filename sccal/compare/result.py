@@ -56,7 +56,11 @@ class FoundEffect:
     effect: str
     change: Literal["gained", "lost", "kept"]
     nats_a: float | None
+    """Evidence for it where A found it."""
     nats_b: float | None
+    held_out_a: float | None
+    """Gain on data that did not fit it, nats."""
+    held_out_b: float | None
     reason: str
     """What the diagnosis without it says of it; empty where it says nothing."""
 

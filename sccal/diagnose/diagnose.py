@@ -1,247 +1,241 @@
-"""From aligned runs of one vehicle to a diagnosis: two loops with different trust in the measurements, and the story.
+"""From aligned runs of one vehicle to a diagnosis: the loop, what it leaves, and the story.
 
-The fine loop takes the noise as the innovations have it; small effects are found there. The path loop trusts the fixes
-only as far as the whole path meets them; effects so large that the fine loop takes them for noise are found there, and
-suggested to the fine loop. Of the two final models the one that drifts less on data it was not fitted to is told.
+See sccal.diagnose.loop for how effects are found, and sccal.diagnose.criteria for what makes one a finding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sccal.align import Aligned
 from sccal.arrays import Floats
 from sccal.calibration.combine import pooled_drive
+from sccal.calibration.held_out import Judged, how, judge
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.result import Estimate, OutageWindow, Parameters
+from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.calibration.single import describe_drive
 from sccal.calibration.status import judge as judge_parameters
-from sccal.diagnose.confounded import confounded_sigmas, linear_effects
+from sccal.diagnose.criteria import ALIKE_NATS, ALIKE_SHARE, LEAST_NATS, PRICE_NATS
 from sccal.diagnose.excitation import excitation
-from sccal.diagnose.held_out import Judged, how
-from sccal.diagnose.honest import under_other_trust
-from sccal.diagnose.loop import MIN_HELD_OUT_NATS, Loop, Step, is_flexible, passes, run_loop, values_in, wandering
-from sccal.diagnose.model import Model, fine_regime, first_model, path_regime
+from sccal.diagnose.loop import Loop, Sized, run_loop, values_in
 from sccal.diagnose.picture import picture_of
-from sccal.diagnose.placebo import NAME as NONSENSE
-from sccal.diagnose.placebo import Placebo, with_placebos
-from sccal.diagnose.pool import WHOLE_RUNS, Score
-from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, RunNoise, Unexplained
-from sccal.diagnose.result import Placebo as PlaceboResult
-from sccal.diagnose.unexplained import variance_fraction
+from sccal.diagnose.result import (
+    Diagnosis,
+    Finding,
+    Judgement,
+    Placebo,
+    Ranked,
+    RunNoise,
+)
+from sccal.diagnose.unexplained import unexplained
 from sccal.effects.catalogue import CATALOGUE
-from sccal.effects.logged import logged_effects
-from sccal.effects.patterns import PATTERNS, Pattern
+from sccal.effects.logged import LoggedColumn
+from sccal.evidence.extension import Free
+from sccal.evidence.joint import Key
+from sccal.evidence.model import Accepted, Model, refitted
+from sccal.evidence.nonsense import NonsenseColumn, with_nonsense
+from sccal.evidence.nuisance import sigmas_beside_small
+from sccal.evidence.posterior import Posterior
+from sccal.evidence.saturated import posterior_of
+from sccal.filter.noise import Reach
 
-BETTER, CLEARLY, GROSS = 0.98, 0.75, 0.6
-"""Shares of a drift: hardly better, clearly better, and what only an effect beyond all noise can bring about."""
-TRANSPORT_S = 0.02
-"""What no log shows of the time that its lines are under way: part of any latency's sigma."""
-SECOND_ORDER = 1.5
 BOOTSTRAP = 400
 RANKED = 8
-TRUST = {
-    "fine": "noise estimated from the innovations of every run, with the findings in the model",
-    "path": (
-        "nothing may wander: fixes and wheels trusted as far as the whole path meets them, because details of these "
-        "logs are wrong in ways that no noise describes"
-    ),
-}
+TRUST = (
+    "noise, constants and effects estimated together from every run's innovations; measurements count by their "
+    "probability of being no outliers"
+)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A finding on its way."""
+
+    sized: Sized
+    aliases: tuple[str, ...]
+    before: Judged
+    after: Judged
 
 
 def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
-    """Find what the model lacks in some runs of one vehicle. Raises DataError where a run cannot be calibrated."""
-    dressed, placebos = with_placebos(runs)
-    own = [{name: one for name, one in run.extras.items() if not name.startswith(NONSENSE)} for run in dressed]
-    candidates = (*linear_effects(), *logged_effects(own), *PATTERNS, *placebos)
-    window_s = options.outage_window_s
+    """Find what the model lacks in some runs of one vehicle.
 
-    def path_loop() -> Loop:
-        return run_loop(first_model(dressed, path_regime(options.filter)), candidates, window_s, with_moments=False)
-
-    # The first fine model waits for nothing that the path loop finds; side by side they share the cores.
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        running = beside.submit(path_loop)
-        first = first_model(dressed, fine_regime(options.filter, options.heading_rate_hz))
-        path = running.result()
-    suggestions = [_at_the_end(path, step) for step in path.steps if not isinstance(step.score.effect, Pattern)]
-    fine = run_loop(first, candidates, window_s, suggestions=suggestions)
-    return _told(_better(fine, path), runs, placebos)
-
-
-def _at_the_end(loop: Loop, step: Step) -> Score:
-    """A step with the values of the final model."""
-    values = np.array([float(v.mean()) for v, _, _ in values_in(loop.model, step.score.effect)])
-    return replace(step.score, values=values)
-
-
-def _better(fine: Loop, path: Loop) -> Loop:
-    """The loop whose final model drifts less; the fine one where they do alike, or where the other found nothing."""
-    drift_fine, drift_path = fine.judged.outage_end_rms_m, path.judged.outage_end_rms_m
-    if not path.steps or drift_fine is None or drift_path is None or drift_path > BETTER * drift_fine:
-        return fine
-    before = path.first_judged.outage_end_rms_m
-    named = [step.score.effect.name for step in path.steps if not isinstance(step.score.effect, Pattern)]
-    seen = [step.score.effect.name for step in fine.steps]
-    gross = bool(named) and named[0] not in seen and before is not None and drift_path < GROSS * before
-    # The few windows of one run are no judge between two kinds of trust; whole runs left out are.
-    whole_runs = len(path.model.problems) >= WHOLE_RUNS
-    return path if gross or (whole_runs and drift_path < CLEARLY * drift_fine) else fine
-
-
-def _told(loop: Loop, runs: Sequence[Aligned], placebos: Sequence[Placebo]) -> Diagnosis:
-    model = loop.model
-    sigmas = confounded_sigmas(model)
-    plain = [one.free.effect for one in model.accepted if not one.free.shapes]
-    elsewhere = under_other_trust(model.problems, plain) if model.regime.name == "fine" else {}
-    named = [s for s in loop.steps if not isinstance(s.score.effect, Pattern) and not _is_second_order(loop, s)]
-    assert loop.pool is not None
-    hidden, detectable, inseparable = excitation(loop.pool, [step.score.effect for step in named])
+    Raises:
+        DataError: where a run cannot be calibrated.
+    """
+    dressed, nonsense = with_nonsense(runs)
+    loop = run_loop(runs, options.filter, options.heading_rate_hz)
+    placebo = _chance(loop, dressed, nonsense)
+    before = judge(loop.first, options.outage_window_s)
+    told = _steps(loop, before, options.outage_window_s)
+    after = told[-1].after if told else _after(loop, before, options.outage_window_s)
+    sigmas = sigmas_beside_small(loop.model) if loop.model.accepted else {}
+    findings = tuple(_finding(loop, one, sigmas) for one in told)
+    hidden, detectable, inseparable = excitation(loop.posterior, loop.candidates, loop.kept, loop.saturated.model)
+    parameters = _parameters(loop.model, runs)
     return Diagnosis(
         runs=tuple(run.name for run in runs),
         vehicle=runs[0].vehicle,
-        trust=TRUST[model.regime.name],
-        findings=tuple(_finding(loop, step, sigmas, elsewhere) for step in named),
-        patterns=tuple(step.score.effect.name for step in loop.steps if step not in named),
-        taken_back=dict(loop.dropped),
+        trust=TRUST,
+        findings=findings,
+        taken_back=dict(loop.taken_back),
         not_excited=tuple(hidden),
         detectable=tuple(detectable),
         inseparable=tuple(inseparable),
-        before=_judgement(loop.first_judged),
-        after=_judgement(loop.judged),
-        held_out_how=how(model),
-        unexplained=_unexplained(loop),
-        placebo=PlaceboResult(
-            tried=len(placebos),
-            passed=loop.placebos_passed,
-            highest_nats=loop.placebo_nats,
-            needed_nats=max(MIN_HELD_OUT_NATS, loop.placebo_nats),
-        ),
+        before=_judgement(before),
+        after=_judgement(after),
+        held_out_how=how(loop.model),
+        unexplained=unexplained(loop),
+        placebo=placebo,
         parameters_before=_parameters(loop.first, runs),
-        parameters_after=_parameters(model, runs),
-        noises=tuple(RunNoise(p.aligned.name, p.noise) for p in model.problems),
+        parameters_after=parameters,
+        noises=tuple(RunNoise(p.aligned.name, p.noise) for p in loop.model.problems),
         notices=tuple(notice for run in runs for notice in run.notices),
+        model=_saved(loop, runs, parameters, after, sigmas),
     )
 
 
-def _finding(
-    loop: Loop,
-    step: Step,
-    sigmas: dict[tuple[str, str], Floats],
-    elsewhere: dict[tuple[str, str], tuple[float, float]],
-) -> Finding:
-    effect = step.score.effect
-    parameters: dict[str, Estimate] = {}
-    per_run: dict[str, tuple[Estimate, ...]] = {}
-    for values, by_fit, parameter in values_in(loop.model, effect):
-        honest = np.maximum(by_fit, sigmas.get((effect.name, parameter.name), by_fit))
-        if step.free.shapes:
-            place = [one.name for one in step.free.parameters].index(parameter.name)
-            honest = np.maximum(honest, step.score.sigmas[place])
-        if effect.name == "gnss_latency":
-            honest = np.hypot(honest, TRANSPORT_S)
-        if values.size > 1:
-            each = zip(values.tolist(), honest.tolist(), strict=True)
-            per_run[parameter.name] = tuple(Estimate(one, sigma, "estimated") for one, sigma in each)
-        weight = 1.0 / honest**2
-        value = float((weight * values).sum() / weight.sum())
-        scatter = float(values.std(ddof=1)) if values.size > 1 else 0.0
-        sigma = float(np.hypot(1.0 / np.sqrt(weight.sum()), scatter / np.sqrt(values.size)))
-        if (effect.name, parameter.name) in elsewhere:
-            other, its_sigma = elsewhere[effect.name, parameter.name]
-            sigma = max(sigma, its_sigma, abs(value - other))
-        parameters[parameter.name] = Estimate(value, sigma, "estimated", "", None, parameter.prior_sigma)
-    for name, value in step.free.shapes.items():
-        parameters[name] = Estimate(float(value), step.shape_sigmas.get(name, float("nan")), "estimated")
-    units = {one.name: one.unit for one in effect.parameters}
+def _chance(loop: Loop, dressed: Sequence[Aligned], nonsense: Sequence[NonsenseColumn]) -> Placebo:
+    """The same evidence for columns about nothing, free beside the final model: this log's own false alarms."""
+    model = loop.model
+    problems = tuple(replace(p, aligned=run) for p, run in zip(model.problems, dressed, strict=True))
+    columns = [Accepted(Free(one)) for one in nonsense]
+    full = refitted(replace(model, problems=problems), [*model.accepted, *columns], reach=None, rounds=2)
+    posterior = posterior_of(full, {one.key: PRICE_NATS for one in columns})
+    kept = [one.key for one in model.accepted]
+    gains = [posterior.gain(one.key, kept) for one in columns]
+    return Placebo(
+        tried=len(columns),
+        passed=sum(gain >= LEAST_NATS for gain in gains),
+        highest_nats=max(gains, default=0.0),
+        needed_nats=LEAST_NATS,
+    )
+
+
+def _steps(loop: Loop, before: Judged, window_s: float) -> list[_Told]:
+    """The findings in the order in which the evidence adds them, each with the drift before and after it."""
+    accepted: list[Accepted] = []
+    steps: list[_Told] = []
+    judged = before
+    last = max((k for k, one in enumerate(loop.sized) if one.size >= 1.0), default=-1)
+    for number, one in enumerate(loop.sized):
+        accepted.append(one.accepted)
+        if one.size < 1.0:
+            continue
+        # What is too small to be told comes in with the last finding, so that the last step ends at the model.
+        model = loop.model if number == last else refitted(loop.model, accepted, reach=Reach.NEAR)
+        after = judge(model, window_s)
+        steps.append(_Told(one, _aliases(loop, one), judged, after))
+        judged = after
+    return steps
+
+
+def _after(loop: Loop, before: Judged, window_s: float) -> Judged:
+    """The drift of a model that holds nothing worth telling."""
+    return judge(loop.model, window_s) if loop.model.accepted else before
+
+
+def _aliases(loop: Loop, one: Sized) -> tuple[str, ...]:
+    """Other candidates that would explain the same: exchanged for it they cost next to no evidence.
+
+    Logged columns that are a function of what the effect follows stand beside it too.
+    """
+    posterior, kept, key = loop.posterior, loop.kept, one.accepted.key
+    rest = [name for name in kept if name != key]
+    whole, allowed = posterior.evidence(kept), max(ALIKE_NATS, ALIKE_SHARE * one.worth_nats)
+    found = [
+        name.partition("(")[0]
+        for name in posterior.rows
+        if name not in kept and whole - posterior.evidence([*rest, name]) < allowed
+    ]
+    name = one.accepted.free.effect.name
+    found += [column for column, follows in loop.candidates.shadows.items() if name in follows]
+    return tuple(other for other in dict.fromkeys(found) if other != name)
+
+
+def _finding(loop: Loop, told: _Told, sigmas: dict[Key, float]) -> Finding:
+    one = told.sized
+    free = one.accepted.free
+    effect = free.effect
+    parameters, per_run = _estimates(loop, one.accepted, sigmas)
     advice = ""
-    if step.indistinguishable_from:
-        beside = [CATALOGUE[name] for name in step.indistinguishable_from if name in CATALOGUE]
-        advice = "; ".join(dict.fromkeys(one.excited_by for one in (effect, *beside)))
+    if told.aliases:
+        beside = [CATALOGUE[name] for name in told.aliases if name in CATALOGUE]
+        advice = "; ".join(dict.fromkeys(each.excited_by for each in (effect, *beside)))
+    runs = range(len(loop.model.problems)) if one.accepted.run is None else [one.accepted.run]
     return Finding(
         name=effect.name,
         title=effect.title,
         reference=effect.reference,
-        parameters={one.name: parameters[one.name] for one in effect.parameters if one.name in parameters},
-        units=units,
+        parameters=parameters,
+        units={each.name: each.unit for each in effect.parameters},
         per_run=per_run,
-        held_out_gain_nats=step.score.held_out_nats,
-        t=step.score.t,
-        indistinguishable_from=step.indistinguishable_from,
+        evidence_nats=one.worth_nats,
+        held_out_gain_nats=one.held_out_nats,
+        t=one.t,
+        indistinguishable_from=told.aliases,
         advice=advice,
-        ranking=tuple(_ranked(one) for one in _with(step.ranking, step.score)[:RANKED]),
-        drift_before_m=step.before.outage_end_rms_m,
-        drift_after_m=step.after.outage_end_rms_m,
-        picture=_picture(loop, step),
+        ranking=_ranking(loop, one),
+        drift_before_m=told.before.outage_end_rms_m,
+        drift_after_m=told.after.outage_end_rms_m,
+        picture=picture_of(loop.first, loop.model, free, list(runs)),
     )
 
 
-def _is_second_order(loop: Loop, step: Step) -> bool:
-    """Whether a second harmonic of the heading is only what a first one of its size brings along.
-
-    A hard iron of A radians has a second harmonic of A²/2 by the compass's geometry, and none where its error is sine
-    and cosine alone. The model keeps it either way; it is no second cause.
-    """
-    if step.score.effect.name != "soft_iron":
-        return False
-    first, second = (_amplitude_rad(loop.model, name) for name in ("hard_iron", "soft_iron"))
-    return bool(second < SECOND_ORDER * 0.5 * first**2)
-
-
-def _amplitude_rad(model: Model, name: str) -> float:
-    """Of a deviation of the compass, 0 where the model has none."""
-    degrees = [float(each.mean()) for each, _, _ in values_in(model, CATALOGUE[name])]
-    return float(np.radians(np.linalg.norm(degrees))) if degrees else 0.0
-
-
-def _with(ranking: Sequence[Score], score: Score) -> list[Score]:
-    """The ranking with the chosen one in it, which a search of moments may have found elsewhere."""
-    others = [one for one in ranking if one.effect.name != score.effect.name]
-    return sorted([score, *others], key=lambda one: -one.held_out_nats)
+def _estimates(
+    loop: Loop, accepted: Accepted, sigmas: dict[Key, float]
+) -> tuple[dict[str, Estimate], dict[str, tuple[Estimate, ...]]]:
+    """Of an effect's parameters and shapes, and of those that every run has its own of the runs' own values."""
+    parameters: dict[str, Estimate] = {}
+    per_run: dict[str, tuple[Estimate, ...]] = {}
+    for values, by_fit, parameter in values_in(loop.model, accepted):
+        keys = [key for key in loop.model.fit.places.keys if key[:2] == (accepted.key, parameter.name)]
+        beside = np.array([sigmas.get(key, 0.0) for key in keys])
+        honest = np.maximum(by_fit, beside)
+        if values.size > 1:
+            each = zip(values.tolist(), honest.tolist(), strict=True)
+            per_run[parameter.name] = tuple(Estimate(value, sigma, "estimated") for value, sigma in each)
+        value, sigma = _pooled(values, honest)
+        parameters[parameter.name] = Estimate(value, sigma, "estimated", "", None, parameter.prior_sigma)
+    of_shapes = loop.shape_sigmas.get(accepted.key, {})
+    for name, shape in accepted.free.shapes.items():
+        parameters[name] = Estimate(float(shape), of_shapes.get(name, float("nan")), "estimated")
+    ordered = [one.name for one in accepted.free.effect.parameters if one.name in parameters]
+    return {name: parameters[name] for name in ordered}, per_run
 
 
-def _ranked(one: Score) -> Ranked:
-    pattern = isinstance(one.effect, Pattern)
-    return Ranked(one.effect.name, one.effect.title, not pattern, one.held_out_nats, one.t, one.size)
+def _pooled(values: Floats, sigmas: Floats) -> tuple[float, float]:
+    """One value for all runs, and its sigma, the runs' scatter included."""
+    weight = 1.0 / sigmas**2
+    value = float((weight * values).sum() / weight.sum())
+    scatter = float(values.std(ddof=1)) if values.size > 1 else 0.0
+    return value, float(np.hypot(1.0 / np.sqrt(weight.sum()), scatter / np.sqrt(values.size)))
 
 
-def _picture(loop: Loop, step: Step) -> Picture | None:
-    runs = range(len(loop.model.problems)) if step.run is None else [step.run]
-    return picture_of(loop.first, loop.model, step.free, list(runs))
-
-
-def _unexplained(loop: Loop) -> Unexplained:
-    """The strongest pattern without a name: one that is in the model, or one that was only told."""
-    steps = [step for step in loop.steps if isinstance(step.score.effect, Pattern)]
-    inside = max(steps, key=lambda step: step.score.held_out_nats, default=None)
-    assert loop.pool is not None
-    told = next((one for one in loop.pool.ranked() if is_flexible(one.effect) and passes(one, loop.placebo_nats)), None)
-    if inside is None and told is None:
-        told = wandering(loop)
-    if inside is None and told is None:
-        return Unexplained(False)
-    if inside is not None and (told is None or inside.score.held_out_nats >= told.held_out_nats):
-        score, picture, values = inside.score, _picture(loop, inside), None
-    else:
-        assert told is not None
-        score, picture, values = told, None, told.values
-    pattern = score.effect
-    assert isinstance(pattern, Pattern)
-    fraction, size = variance_fraction(loop.model, pattern, values)
-    return Unexplained(
-        significant=True,
-        port=pattern.port,
-        depends_on=pattern.depends_on,
-        variance_fraction=fraction,
-        held_out_gain_nats=score.held_out_nats,
-        t=score.t,
-        size=size,
-        picture=picture,
+def _ranking(loop: Loop, one: Sized) -> tuple[Ranked, ...]:
+    """The best candidates at the moment when this one was added."""
+    posterior = loop.posterior
+    before = loop.kept[: loop.kept.index(one.accepted.key)]
+    gains = sorted(
+        ((posterior.gain(key, before), key) for key in posterior.rows if key not in before), key=lambda pair: -pair[0]
     )
+    effects = {free.accepted.key: free.accepted.free for free in loop.sized}
+    effects |= {accepted.key: accepted.free for accepted in loop.saturated.model.accepted}
+    return tuple(_ranked(posterior, effects[key], key, gain, before) for gain, key in gains[:RANKED])
+
+
+def _ranked(posterior: Posterior, free: Free, key: str, gain: float, before: Sequence[str]) -> Ranked:
+    mean, covariance = posterior.given([*before, key])
+    places = posterior.places([*before, key])
+    mine = np.flatnonzero(np.isin(places, posterior.rows[key]))
+    t = float(np.sqrt(max(float(mean[mine] @ np.linalg.solve(covariance[np.ix_(mine, mine)], mean[mine])), 0.0)))
+    matters = max(min(one.matters / one.prior_sigma for one in free.parameters), 1e-12)
+    size = float(np.abs(mean[mine]).max()) / matters
+    return Ranked(free.effect.name, free.effect.title, True, gain, t, size)
 
 
 def _judgement(judged: Judged) -> Judgement:
@@ -281,3 +275,35 @@ def _parameters(model: Model, runs: Sequence[Aligned]) -> Parameters:
     drive = pooled_drive([describe_drive(run, float(model.fit.mode[:2].mean())) for run in runs])
     values = np.append(model.fit.mode[:3], middle + float(apart.mean()))
     return judge_parameters(values, covariance, runs[0].vehicle, model.problems[0].options, drive)
+
+
+def _saved(
+    loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: Judged, sigmas: dict[Key, float]
+) -> SavedModel:
+    """The model that was judged, for other commands to start from."""
+    effects = []
+    for one in loop.sized:
+        accepted = one.accepted
+        estimates, _ = _estimates(loop, accepted, sigmas)
+        effect = accepted.free.effect
+        effects.append(
+            SavedEffect(
+                name=effect.name,
+                title=effect.title,
+                parameters={name: each for name, each in estimates.items() if name not in accepted.free.shapes},
+                units={each.name: each.unit for each in effect.parameters},
+                shapes=dict(accepted.free.shapes),
+                run="" if accepted.run is None else runs[accepted.run].name,
+                told=one.size >= 1.0,
+                prior_scale=accepted.free.prior_scale,
+                column=effect.range if isinstance(effect, LoggedColumn) else None,
+            )
+        )
+    return SavedModel(
+        vehicle=runs[0].vehicle.name,
+        parameters=parameters,
+        effects=tuple(effects),
+        noises={problem.aligned.name: problem.noise for problem in loop.model.problems},
+        outage_end_rms_m=after.outage_end_rms_m,
+        how=how(loop.model),
+    )

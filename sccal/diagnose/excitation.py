@@ -7,90 +7,105 @@ from collections.abc import Sequence
 import numpy as np
 
 from sccal.arrays import Floats, Ints
-from sccal.calibration.extension import Free
-from sccal.diagnose.loop import MIN_T
-from sccal.diagnose.placebo import Placebo
-from sccal.diagnose.pool import Pool
+from sccal.diagnose.criteria import BEYOND_SIGMAS
 from sccal.diagnose.result import Detectable, Inseparable, NotExcited
+from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
 from sccal.effects.logged import LoggedColumn
-from sccal.effects.patterns import Pattern
+from sccal.evidence.candidates import Candidates
+from sccal.evidence.model import Model
+from sccal.evidence.nuisance import SMALL
+from sccal.evidence.posterior import CONSTANTS, Posterior
 
-BEYOND = 1.5
 SAME = 0.98
 """Correlation from which on two effects are one."""
 
 
-def excitation(pool: Pool, found: Sequence[Effect]) -> tuple[list[NotExcited], list[Detectable], list[Inseparable]]:
-    """Of every effect with a name that was not found: whether it could have been, and from which size on."""
-    names = {effect.name for effect in found}
-    named = [e for e in pool.candidates if not isinstance(e, Pattern | Placebo) and e.name not in names]
+def excitation(
+    posterior: Posterior, candidates: Candidates, kept: Sequence[str], saturated: Model
+) -> tuple[list[NotExcited], list[Detectable], list[Inseparable]]:
+    """Of every effect with a name that was not found: whether it could have been, and from which size on.
+
+    ``saturated`` is the fit that the posterior comes from, with every candidate in one form.
+    """
+    found = {one.partition("(")[0] for one in kept}
+    seen = _Seen(posterior)
+    free = {one.key: one.free for one in saturated.accepted if one.key not in kept and one.run is None}
     hidden: list[NotExcited] = []
-    shown: list[tuple[Effect, Detectable]] = []
-    for effect in named:
-        parameters = Free(effect).parameters
-        if not parameters:
-            continue
-        sigmas = pool.score(effect).sigmas
+    shown: list[tuple[str, Effect, Detectable]] = []
+    hidden += [
+        NotExcited(effect.name, effect.title, effect.excited_by)
+        for effect in CATALOGUE.values()
+        if effect.search == "scale" and effect.name not in candidates.forms and effect.name not in found
+    ]
+    for key, one in free.items():
+        effect = one.effect
         # As much as is always possible explains nothing; what is beyond has to stand out.
-        least = np.array([one.matters for one in parameters]) + BEYOND * MIN_T * sigmas
-        if np.any(least > [one.prior_sigma for one in parameters]):
+        sigmas = seen.sigmas(key, len(one.parameters)) * np.array([p.prior_sigma for p in one.parameters])
+        least = np.array([p.matters for p in one.parameters]) + BEYOND_SIGMAS * sigmas
+        if np.any(least > [p.prior_sigma for p in one.parameters]):
             hidden.append(NotExcited(effect.name, effect.title, effect.excited_by))
             continue
-        smallest = {one.name: float(size) for one, size in zip(parameters, least, strict=True)}
-        units = {one.name: one.unit for one in parameters}
-        shown.append((effect, Detectable(effect.name, effect.title, smallest, units)))
-    return (
-        hidden,
-        [one for _, one in shown],
-        _sets(pool, [effect for effect, _ in shown if not isinstance(effect, LoggedColumn)]),
-    )
+        smallest = {p.name: float(size) for p, size in zip(one.parameters, least, strict=True)}
+        units = {p.name: p.unit for p in one.parameters}
+        shown.append((key, effect, Detectable(effect.name, effect.title, smallest, units)))
+    named = {key: effect for key, effect, _ in shown if not isinstance(effect, LoggedColumn)}
+    return hidden, [one for _, _, one in shown], _sets(seen, named)
 
 
-def _sets(pool: Pool, effects: Sequence[Effect]) -> list[Inseparable]:
+class _Seen:
+    """The information about all candidates, small amounts of all others allowed."""
+
+    def __init__(self, posterior: Posterior) -> None:
+        self.posterior = posterior
+        precision = np.linalg.inv(posterior.covariance)
+        size = precision.shape[0]
+        self.information = precision - np.diag(np.r_[np.zeros(CONSTANTS), np.ones(size - CONSTANTS)])
+        self.small = np.full(size, SMALL * 0.1)
+        self.small[:CONSTANTS] = 1.0
+
+    def reduced(self, kept: Ints) -> Floats:
+        """Information about some parameters with the others, within their small priors, marginalised."""
+        others = np.setdiff1d(np.arange(self.small.size), kept)
+        inner = self.information[np.ix_(others, others)] + np.diag(1.0 / self.small[others] ** 2)
+        cross = self.information[np.ix_(kept, others)]
+        return np.asarray(self.information[np.ix_(kept, kept)] - cross @ np.linalg.solve(inner, cross.T))
+
+    def sigmas(self, key: str, count: int) -> Floats:
+        """(count,) of one effect's parameters, in units of their priors; of a run's parameter, the runs' best."""
+        rows = self.posterior.rows[key]
+        reduced = self.reduced(rows) + np.eye(rows.size)
+        sigma = np.sqrt(np.maximum(np.diag(np.linalg.inv(reduced)), 0.0))
+        return np.array([sigma[k::count].min() for k in range(count)]) if rows.size > count else sigma
+
+
+def _sets(seen: _Seen, effects: dict[str, Effect]) -> list[Inseparable]:
     """Effects that could each be seen alone and not beside each other."""
     sets: list[set[str]] = []
-    for k, one in enumerate(effects):
-        for other in effects[k + 1 :]:
-            if _correlation(pool, one, other) > SAME:
-                joined = {one.name, other.name}
+    keys = list(effects)
+    for k, one in enumerate(keys):
+        for other in keys[k + 1 :]:
+            if _correlation(seen, one, other) > SAME:
+                joined = {one, other}
                 for group in [group for group in sets if group & joined]:
                     joined |= group
                     sets.remove(group)
                 sets.append(joined)
-    by_name = {effect.name: effect for effect in effects}
-    return [
-        Inseparable(
-            tuple(name for name in by_name if name in group), _advice([by_name[n] for n in by_name if n in group])
-        )
-        for group in sets
-    ]
+    return [_inseparable([effects[key] for key in keys if key in group]) for group in sets]
 
 
-def _advice(effects: Sequence[Effect]) -> str:
-    return "; ".join(dict.fromkeys(effect.excited_by for effect in effects))
+def _inseparable(effects: Sequence[Effect]) -> Inseparable:
+    advice = "; ".join(dict.fromkeys(effect.excited_by for effect in effects))
+    return Inseparable(tuple(effect.name for effect in effects), advice)
 
 
-def _correlation(pool: Pool, one: Effect, other: Effect) -> float:
+def _correlation(seen: _Seen, one: str, other: str) -> float:
     """Largest canonical correlation of two effects' columns, with small amounts of all others allowed."""
-    a, b = pool.rows(one.name), pool.rows(other.name)
-    both = np.concatenate((a, b))
-    reduced = _reduced(pool, both)
-    aa, bb = reduced[: a.size, : a.size], reduced[a.size :, a.size :]
-    ab = reduced[: a.size, a.size :]
+    a, b = seen.posterior.rows[one], seen.posterior.rows[other]
+    reduced = seen.reduced(np.concatenate((a, b)))
+    aa, ab, bb = reduced[: a.size, : a.size], reduced[: a.size, a.size :], reduced[a.size :, a.size :]
     try:
         left, right = np.linalg.cholesky(aa), np.linalg.cholesky(bb)
     except np.linalg.LinAlgError:
         return 0.0
-    whitened = np.linalg.solve(left, np.linalg.solve(right, ab.T).T)
-    return float(np.linalg.svd(whitened, compute_uv=False).max())
-
-
-def _reduced(pool: Pool, kept: Ints) -> Floats:
-    """Information about some parameters with the others, at their small priors, marginalised."""
-    _, information = pool.total
-    prior = pool.precision(kept)
-    others = np.setdiff1d(np.flatnonzero(np.isfinite(prior)), kept)
-    inner = information[np.ix_(others, others)] + np.diag(prior[others])
-    cross = information[np.ix_(kept, others)]
-    return np.asarray(information[np.ix_(kept, kept)] - cross @ np.linalg.solve(inner, cross.T))
+    return float(np.linalg.svd(np.linalg.solve(left, np.linalg.solve(right, ab.T).T), compute_uv=False).max())

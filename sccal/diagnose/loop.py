@@ -1,386 +1,241 @@
-"""The loop: score every candidate, accept the best that passes, fit again, until nothing passes."""
+"""The one loop: saturate, let the evidence choose, refit, look for moments and shapes, until nothing changes.
+
+all candidates free beside the noise  →  evidence of every subset  →  the chosen ones refitted with their own noise
+→  time constants and thresholds refined, moments and places looked for beside them  →  again with what was found
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from sccal.align import Aligned
 from sccal.arrays import Floats
-from sccal.calibration.extension import Free
-from sccal.diagnose.evidence import Evidence, gather
-from sccal.diagnose.held_out import Judged, judge
-from sccal.diagnose.model import Accepted, Model, names_of, refitted, without_transport
-from sccal.diagnose.moments import Moment, find_moments
-from sccal.diagnose.parallel import each
-from sccal.diagnose.placebo import Placebo
-from sccal.diagnose.pool import WHOLE_RUNS, Pool, Score
-from sccal.effects.effect import Effect, Parameter
-from sccal.effects.patterns import PATTERNS, Pattern
+from sccal.diagnose.criteria import LEAST_NATS, LEAST_T, PRICE_NATS, SEARCH_NATS
+from sccal.diagnose.shapes import Found, best_forms, find_moments, refined
+from sccal.effects.effect import Parameter
+from sccal.evidence.candidates import Candidates, gather_candidates
+from sccal.evidence.extension import Free
+from sccal.evidence.held_out_gain import held_out_gain
+from sccal.evidence.joint import Key
+from sccal.evidence.model import Accepted, Model, bare_model, refitted
+from sccal.evidence.parallel import each
+from sccal.evidence.posterior import Posterior
+from sccal.evidence.saturated import Saturated, saturate
+from sccal.filter.levels import Noise
+from sccal.filter.noise import Reach
+from sccal.filter.options import FilterOptions
 
-MIN_HELD_OUT_NATS = 8.0
-MIN_T = 4.5
-MIN_PATTERN_NATS = 12.0
-MIN_PATTERN_T = 5.0
-MIN_MOMENT_T = 6.0
-CLEARLY_BETTER_NATS = 5.0
-CLEARLY_BETTER = 1.25
-MANY_SHAPES = 3
-"""A few waves of time or place follow anything that changes slowly or from place to place: told, never added."""
-ALIAS_NATS = 3.0
-ALIAS_SHARE = 0.5
-ALIAS_LACK = 0.02
-MAX_FINDINGS = 8
-RIVAL_SHARE, MAX_RIVALS = 0.75, 2
-LEVEL_NATS, LEVEL_SHARE = 5.0, 0.04
-"""Likelihoods this near, in nats or in parts of the gain, do not tell two causes apart."""
-KEPT_T = 3.0
-HINT_NATS, HINT_T, MAX_HINTS = 3.0, 3.5, 3
-MIN_SWALLOWED_NATS, FREED_NATS = 15.0, 4.0
-CLEARLY_LESS = 0.9
-WANDERING_RAD = np.radians(1.0)
-MIN_WANDER_NATS, MIN_WANDER_T, MOST_LEFT = 3.0, 6.0, 0.5
-WORSE, MUCH_WORSE = 1.02, 1.15
-MUCH_LIKELIER = 0.01
-"""Nats per measurement."""
+MOST_ROUNDS = 5
+STAYS = 0.3
+"""Of its sigma: a shape that moves less has not moved."""
 
 
 @dataclass(frozen=True)
-class Step:
-    """One acceptance, with what was known when it was made."""
+class Sized:
+    """One effect of the model as it came out."""
 
-    score: Score
-    free: Free
-    run: int | None
-    indistinguishable_from: tuple[str, ...]
-    ranking: tuple[Score, ...]
-    before: Judged
-    after: Judged
-    shape_sigmas: Mapping[str, float] = field(default_factory=dict)
+    accepted: Accepted
+    worth_nats: float
+    """The evidence with it over that without it, its price paid."""
+    held_out_nats: float
+    """What it brings on stretches or runs that did not fit it; infinite for a moment, which no other data can show."""
+    t: float
+    size: float
+    """Largest parameter in units of the smallest that matters."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether it passes as a finding, whatever its size."""
+        return self.worth_nats >= LEAST_NATS and self.t >= LEAST_T and self.held_out_nats > 0.0
 
 
 @dataclass
 class Loop:
-    """The model as it grew."""
+    """The model as it was found."""
 
     first: Model
     model: Model
-    first_judged: Judged
-    judged: Judged
-    steps: list[Step] = field(default_factory=list)
-    dropped: dict[str, str] = field(default_factory=dict)
-    """Candidates that passed and were taken back, and why."""
-    pool: Pool | None = None
-    """The evidence when nothing passed any more."""
-    placebo_nats: float = 0.0
-    """Largest held-out gain of a nonsense column in the last round, and how many passed the test there."""
-    placebos_passed: int = 0
+    candidates: Candidates
+    saturated: Saturated
+    moments: list[Found] = field(default_factory=list)
+    shape_sigmas: dict[str, dict[str, float]] = field(default_factory=dict)
+    """By effect (with its shapes, as refined): sigmas of the shapes."""
+    looked_beside: frozenset[str] | None = None
+    """Effects beside which moments and places were looked for last."""
+    taken_back: dict[str, str] = field(default_factory=dict)
+    """Effects that the evidence chose and that did not hold, and why."""
+    sized: list[Sized] = field(default_factory=list)
+    """Of the final model, in the order in which the evidence adds them."""
+
+    @property
+    def posterior(self) -> Posterior:
+        return self.saturated.posterior
+
+    @property
+    def kept(self) -> list[str]:
+        return [one.key for one in self.model.accepted]
 
 
-def evidence_of(model: Model, candidates: Sequence[Effect]) -> list[Evidence]:
-    """One scoring pass per run; the time that lines take is held at zero there, for it is a candidate itself."""
-    runs = range(len(model.problems))
-    return each(lambda k: gather(*without_transport(model.problems[k], model.at(k)), candidates), runs)
+def run_loop(runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: float) -> Loop:
+    """Find what the model lacks in some runs of one vehicle.
+
+    Raises:
+        DataError: where a run hardly moves.
+    """
+    first = bare_model(runs, options, heading_rate_hz)
+    candidates = gather_candidates([first.view(k) for k in range(len(runs))])
+    competing = best_forms(first, candidates, ())
+    saturated = saturate(first, competing, _prices(competing), Reach.FEW)
+    loop = Loop(first, first, candidates, saturated)
+    kept: list[Accepted] = []
+    for _ in range(MOST_ROUNDS):
+        before = {one.key for one in kept}
+        kept = _chosen(loop, competing)
+        loop.model = _refitted(loop, kept)
+        kept, moments = _with_shapes(loop, kept)
+        if {one.key for one in kept} == before and not moments:
+            break
+        loop.moments += moments
+        known = [*kept, *(one.accepted for one in loop.moments)]
+        competing = [*best_forms(loop.model, candidates, kept), *(one for one in known if one.run is not None)]
+        competing = list({one.key: one for one in competing}.values())
+        loop.saturated = saturate(loop.model, competing, _prices(competing), Reach.NEAR, _noises(loop.saturated))
+    else:
+        loop.model = _refitted(loop, _chosen(loop, competing))
+    _take_back(loop)
+    return loop
 
 
-def passes(score: Score, least_nats: float = 0.0) -> bool:
-    """Whether a candidate is a finding."""
-    pattern = isinstance(score.effect, Pattern)
-    nats, t = (MIN_PATTERN_NATS, MIN_PATTERN_T) if pattern else (MIN_HELD_OUT_NATS, MIN_T)
-    return score.held_out_nats >= max(nats, least_nats) and score.t >= t and score.size >= 1.0
+def _prices(competing: Sequence[Accepted]) -> dict[str, float]:
+    """What each costs: its prior odds, and for what was searched for the places where it was looked for."""
+    return {one.key: SEARCH_NATS if one.run is not None else PRICE_NATS for one in competing}
 
 
-def is_flexible(effect: Effect) -> bool:
-    """Whether it is a pattern that could follow anything slow."""
-    return isinstance(effect, Pattern) and len(effect.parameters) >= MANY_SHAPES
+def _noises(saturated: Saturated) -> list[Noise]:
+    return [problem.noise for problem in saturated.model.problems]
 
 
-def chosen(ranking: Sequence[Score], least_nats: float) -> Score | None:
-    """The best that passes; a pattern without a name only where no effect with one does nearly as well."""
-    passing = [one for one in ranking if passes(one, least_nats) and not is_flexible(one.effect)]
-    named = next((one for one in passing if not isinstance(one.effect, Pattern)), None)
-    pattern = next((one for one in passing if isinstance(one.effect, Pattern)), None)
-    if named is None or pattern is None:
-        return named or pattern
-    clearly = max(CLEARLY_BETTER * named.held_out_nats, named.held_out_nats + CLEARLY_BETTER_NATS)
-    return pattern if pattern.held_out_nats > clearly else named
+def _chosen(loop: Loop, competing: Sequence[Accepted]) -> list[Accepted]:
+    by_key = {one.key: one for one in competing}
+    return [
+        by_key[key]
+        for key in _in_order(loop.posterior, loop.posterior.select([key for key in loop.kept if key in by_key]))
+    ]
 
 
-def aliases(pool: Pool, score: Score) -> tuple[str, ...]:
-    """Other effects with a name that leave the chosen one nothing to explain."""
-    name = score.effect.name
-    found = []
-    for other in pool.candidates:
-        if other.name == name or isinstance(other, Pattern | Placebo) or not pool.rows(other.name).size:
-            continue
-        if pool.gain(other.name) < ALIAS_SHARE * score.held_out_nats:
-            continue
-        lacking = float(pool.held_out((name, other.name)).sum() - pool.held_out((other.name,), (name,)).sum())
-        if lacking < max(ALIAS_NATS, ALIAS_LACK * score.held_out_nats):
-            found.append(other.name)
-    return tuple(found)
+def _in_order(posterior: Posterior, kept: Sequence[str]) -> list[str]:
+    """The kept effects, each the one that brings most beside those before it."""
+    ordered: list[str] = []
+    left = list(kept)
+    while left:
+        best = max(left, key=lambda key: posterior.gain(key, ordered))
+        ordered.append(best)
+        left.remove(best)
+    return ordered
 
 
-def run_loop(
-    model: Model,
-    candidates: Sequence[Effect],
-    window_s: float,
-    with_moments: bool = True,
-    suggestions: Sequence[Score] = (),
-) -> Loop:
-    """Grow the model until nothing passes; suggestions are effects found under another trust in the measurements."""
-    judged = judge(model, window_s)
-    loop = Loop(model, model, judged, judged)
+def _refitted(loop: Loop, kept: Sequence[Accepted]) -> Model:
+    """The chosen effects with their own noise, starting from where the saturated fit has them."""
+    starts = loop.saturated.given([one.key for one in kept])
+    return refitted(loop.saturated.model, kept, starts, Reach.NEAR, _noises(loop.saturated))
+
+
+def _with_shapes(loop: Loop, kept: list[Accepted]) -> tuple[list[Accepted], list[Found]]:
+    """Time constants and thresholds where they are likeliest, and the moments that stand out beside the model."""
+    new: list[Accepted] = []
+    for one in kept:
+        if one.free.shapes and one.run is None:
+            better, sigmas = refined(loop.model, one)
+            # A shape that stays within its error keeps its value, so that the loop can come to rest.
+            moved = any(abs(better.free.shapes[k] - one.free.shapes[k]) > STAYS * sigmas[k] for k in sigmas)
+            new.append(better if moved else one)
+            loop.shape_sigmas[new[-1].key] = sigmas
+        else:
+            new.append(one)
+    keys = frozenset(one.key for one in new)
+    if keys == loop.looked_beside:
+        return new, []
+    loop.looked_beside = keys
+    known = [one.free.effect.name for one in loop.moments]
+    of_runs = each(lambda run: find_moments(loop.model, run, known), range(len(loop.model.problems)))
+    found = sorted((one for several in of_runs for one in several), key=lambda one: -one.gain_nats)
+    for moment in found[:1]:
+        loop.shape_sigmas[moment.free.key] = dict(moment.shape_sigmas)
+    return new, found[:1]
+
+
+def _take_back(loop: Loop) -> None:
+    """Leave what does not hold once it is fitted; what is too small to be told may stay where it helps."""
     while True:
-        inside = {one.free.effect.name for one in loop.model.accepted}
-        left = [effect for effect in candidates if effect.name not in inside | set(loop.dropped)]
-        pool = loop.pool = Pool(evidence_of(loop.model, left), left)
-        placebos = pool.placebos()
-        loop.placebos_passed = sum(passes(one) for one in placebos)
-        least = loop.placebo_nats = max((one.held_out_nats for one in placebos), default=0.0)
-        ranking = pool.ranked()
-        best = chosen([one for one in ranking if _can_be_judged(loop.model, one.effect)], least)
-        moment = _best_moment(loop) if with_moments else None
-        if len(loop.steps) >= MAX_FINDINGS:
-            return loop
-        if moment is not None and (best is None or moment.gain_nats > CLEARLY_BETTER * best.held_out_nats):
-            best = _as_score(moment)
-            accepted = Accepted(moment.free, moment.run)
-        elif best is not None:
-            accepted = Accepted(Free(best.effect))
-        elif not _swallowed(loop, ranking, suggestions, least, window_s):
-            return loop
-        else:
-            continue
-        if accepted.run is None:
-            passing = [one for one in ranking if passes(one, least) and _can_be_judged(loop.model, one.effect)]
-            best, grown, also = _contest(loop, pool, best, passing)
-            accepted = Accepted(Free(best.effect))
-        else:
-            grown, also = _with(loop.model, accepted, best.values), ()
-        after = judge(grown, window_s)
-        doubt = _doubt(loop.judged, after, grown, best.effect, accepted.run is not None)
-        if doubt:
-            loop.dropped[best.effect.name] = doubt
-            continue
-        shapes = moment.shape_sigmas if moment is not None and accepted.run is not None else {}
-        loop.steps.append(Step(best, accepted.free, accepted.run, also, tuple(ranking), loop.judged, after, shapes))
-        loop.model, loop.judged = grown, after
-        _prune(loop, window_s)
+        loop.sized = sized_of(loop.model, loop.posterior)
+        weak = [one for one in loop.sized if not (one.holds if one.size >= 1.0 else one.held_out_nats > 0.0)]
+        if not weak:
+            return
+        gone = {one.accepted.key for one in weak}
+        for one in weak:
+            if one.size >= 1.0:
+                loop.taken_back[one.accepted.free.effect.name] = _why(one)
+        loop.model = _refitted(loop, [one for one in loop.model.accepted if one.key not in gone])
 
 
-def _prune(loop: Loop, window_s: float) -> None:
-    """Take out what a later finding has made unnecessary: a drift, once the step is in that it had to imitate."""
-    newest = loop.steps[-1].score.effect.name
-    for step in loop.steps[:-1]:
-        effect = step.score.effect
-        size, t = size_in(loop.model, effect)
-        if size >= 1.0 and t >= KEPT_T:
-            continue
-        kept = tuple(one for one in loop.model.accepted if one.free.effect.name != effect.name)
-        loop.model = refitted(loop.model, kept, {})
-        loop.judged = judge(loop.model, window_s)
-        loop.dropped[effect.name] = f"with {newest} in the model nothing of it is left ({t:.1f} of its sigma)"
-        loop.steps = [one for one in loop.steps if one.score.effect.name != effect.name]
-        # The first of the remaining steps starts where the model did.
-        loop.steps = [replace(one, before=loop.first_judged) if k == 0 else one for k, one in enumerate(loop.steps)]
-        loop.steps[-1] = replace(loop.steps[-1], after=loop.judged)
-        return
+def _why(one: Sized) -> str:
+    if one.worth_nats < LEAST_NATS:
+        return f"it brings {one.worth_nats:.1f} nats of evidence, and a finding needs {LEAST_NATS:.0f}"
+    if one.t < LEAST_T:
+        return f"it is {one.t:.1f} times its sigma, and a finding needs {LEAST_T:g}"
+    return "it does not help on the data that did not fit it"
 
 
-def _can_be_judged(model: Model, effect: Effect) -> bool:
-    """Whether an effect may be a finding under this trust.
-
-    Where only the whole path counts, and runs are judged by others, what belongs to each run alone says nothing to the
-    judge: a clock of its own fits every run's details, which are not to be trusted there.
-    """
-    whole_runs = len(model.problems) >= WHOLE_RUNS
-    own = any(parameter.scope == "run" for parameter in effect.parameters)
-    return not (own and whole_runs and model.regime.name == "path")
-
-
-def _with(model: Model, accepted: Accepted, values: Floats) -> Model:
-    """The model with one more effect, refitted from first values of its parameters."""
-    return refitted(model, (*model.accepted, accepted), {accepted.free.effect.name: values})
-
-
-def _contest(loop: Loop, pool: Pool, best: Score, passing: Sequence[Score]) -> tuple[Score, Model, tuple[str, ...]]:
-    """The best candidate against those that gain nearly as much, each refitted with the noise estimated anew.
-
-    Scores are linear and the noise is that of a model that lacks the effect; near ties are settled by the whole
-    likelihood. Where that does not tell either, the candidate whose size is least surprising is named, and the others
-    are said to be indistinguishable from it.
-    """
-    rivals = [best]
-    if not isinstance(best.effect, Pattern):
-        near = [one for one in passing if one.held_out_nats > RIVAL_SHARE * best.held_out_nats]
-        rivals += [one for one in near if one is not best and not isinstance(one.effect, Pattern)][:MAX_RIVALS]
-    grown = [_with(loop.model, Accepted(Free(one.effect)), one.values) for one in rivals]
-    if len(rivals) == 1:
-        return best, grown[0], aliases(pool, best)
-    gains = np.array([_nll(loop.model) - _nll(one) for one in grown])
-    most = float(gains.max())
-    level = [k for k in range(len(rivals)) if gains[k] > most - max(LEVEL_NATS, LEVEL_SHARE * most)]
-    surprise = [_surprise(grown[k], rivals[k].effect) for k in level]
-    winner = level[int(np.argmin(surprise))]
-    beside = [rivals[k].effect.name for k in level if k != winner]
-    also = tuple(dict.fromkeys((*beside, *aliases(pool, rivals[winner]))))
-    return rivals[winner], grown[winner], also
-
-
-def _surprise(model: Model, effect: Effect) -> float:
-    """Squared size of an effect's parameters in units of their priors."""
-    return sum(float(np.mean((values / one.prior_sigma) ** 2)) for values, _, one in values_in(model, effect))
-
-
-def _swallowed(
-    loop: Loop, ranking: Sequence[Score], suggestions: Sequence[Score], least_nats: float, window_s: float
-) -> bool:
-    """Try effects that the noise may have been taken for: with the noise estimated anew, does the run become likelier?
-
-    A compass that drifts by 10 degrees is a compass with a slow error of 5, until the drift is in the model.
-    """
-    inside = {one.free.effect.name for one in loop.model.accepted}
-    hinted = [one for one in suggestions if one.effect.name not in inside | set(loop.dropped)]
-    promising = [one for one in ranking if one.held_out_nats > HINT_NATS and one.t > HINT_T and one.size >= 1.0]
-    tried: set[str] = set()
-    for score in (*hinted, *promising):
-        effect = score.effect
-        if isinstance(effect, Pattern) or effect.name in tried or len(tried) >= MAX_HINTS:
-            continue
-        if not _can_be_judged(loop.model, effect):
-            continue
-        tried.add(effect.name)
-        accepted = Accepted(Free(effect))
-        grown = _with(loop.model, accepted, score.values)
-        gain = _nll(loop.model) - _nll(grown)
-        size, t = size_in(grown, effect)
-        # What the noise gives back when the effect is in counts as much as a likelihood that is little higher.
-        needed = (
-            FREED_NATS if _heading_variance(grown) < MOST_LEFT * _heading_variance(loop.model) else MIN_SWALLOWED_NATS
-        )
-        if gain < needed or size < 1.0 or t < MIN_T:
-            continue
-        after = judge(grown, window_s)
-        if gain < least_nats and not _drifts_less(loop.judged, after, grown):
-            continue
-        if _doubt(loop.judged, after, grown, effect, False):
-            continue
-        found = _score_in(grown, effect, gain)
-        loop.steps.append(Step(found, accepted.free, None, (), tuple(ranking), loop.judged, after))
-        loop.model, loop.judged = grown, after
-        return True
-    return False
-
-
-def wandering(loop: Loop) -> Score | None:
-    """The pattern of time or place that a heading's large slow error follows, if it follows one.
-
-    Such an error is noise to the filter, and a pattern with few bends against noise with the same bends looks like
-    nothing. With the noise estimated anew beside the pattern, it is one or the other.
-    """
-    model = loop.model
-    if max(problem.noise.heading_coloured_rad for problem in model.problems) < WANDERING_RAD:
-        return None
-    found: list[Score] = []
-    for pattern in PATTERNS:
-        if pattern.port != "heading" or not is_flexible(pattern):
-            continue
-        grown = _with(model, Accepted(Free(pattern)), np.zeros(len(pattern.parameters)))
-        gain = _nll(model) - _nll(grown)
-        size, t = size_in(grown, pattern)
-        freed = _heading_variance(grown) < MOST_LEFT * _heading_variance(model)
-        if gain >= MIN_WANDER_NATS and t >= MIN_WANDER_T and size >= 1.0 and freed:
-            found.append(_score_in(grown, pattern, gain))
-    return max(found, key=lambda one: one.gain_nats, default=None)
-
-
-def _drifts_less(before: Judged, after: Judged, grown: Model) -> bool:
-    """Whether whole runs left out drift clearly less: better evidence than nats that nonsense can gain too."""
-    if len(grown.problems) < WHOLE_RUNS or not before.outage_end_rms_m or not after.outage_end_rms_m:
-        return False
-    return after.outage_end_rms_m < CLEARLY_LESS * before.outage_end_rms_m
-
-
-def _score_in(model: Model, effect: Effect, gain_nats: float) -> Score:
-    """An effect as a refitted model has it, found by the whole likelihood."""
-    size, t = size_in(model, effect)
-    inside = values_in(model, effect)
-    values = np.array([float(each.mean()) for each, _, _ in inside])
-    sigmas = np.array([float(each.mean()) for _, each, _ in inside])
-    return Score(effect, gain_nats, gain_nats, t, values, sigmas, size)
-
-
-def _heading_variance(model: Model) -> float:
-    """Of the heading's slow error, rad², the runs' mean."""
-    return float(np.mean([problem.noise.heading_coloured_rad**2 for problem in model.problems]))
-
-
-def _nll(model: Model) -> float:
-    """Negative log-likelihood of all runs, with a moderate price for noise far from its prior left out."""
-    return sum(one.path.nll_heading + one.path.nll_fix for one in model.fit.runs)
-
-
-def _best_moment(loop: Loop) -> Moment | None:
-    """The moment or place that stands out most in any run."""
-
-    def of_run(run: int) -> list[Moment]:
-        known = [one.free.effect.name for one in loop.model.accepted if one.run == run]
-        return find_moments(loop.model, run, [*known, *loop.dropped])
-
-    of_runs = each(of_run, range(len(loop.model.problems)))
-    found = [one for several in of_runs for one in several]
-    good = [one for one in found if one.gain_nats >= MIN_HELD_OUT_NATS and one.t >= MIN_MOMENT_T and one.size >= 1.0]
-    return max(good, key=lambda one: one.gain_nats, default=None)
-
-
-def _as_score(moment: Moment) -> Score:
-    gain = moment.gain_nats
-    return Score(moment.free.effect, gain, gain, moment.t, moment.values, moment.sigmas, moment.size)
-
-
-def _doubt(before: Judged, after: Judged, grown: Model, effect: Effect, is_moment: bool) -> str:
-    """Why an effect that passed is taken back once it is in the filter; empty where it stays."""
-    size, t = size_in(grown, effect)
-    if size < 1.0 or t < KEPT_T:
-        return f"refitted it came out at {size:.1f} of the smallest size that matters, {t:.1f} of its sigma"
-    if not is_moment and before.outage_end_rms_m and after.outage_end_rms_m:
-        first_m, then_m = before.outage_end_rms_m, after.outage_end_rms_m
-        worse = then_m / first_m
-        # Whole runs left out are a hard judge. The few windows of one run are not: there the likelihood has its say.
-        likelier = before.nll_per_measurement - after.nll_per_measurement
-        whole_runs = len(grown.problems) >= WHOLE_RUNS
-        limit = WORSE if whole_runs or likelier < 0.0 else MUCH_WORSE if likelier < MUCH_LIKELIER else np.inf
-        if worse > limit:
-            return f"with it the drift without fixes grew from {first_m:.2f} to {then_m:.2f} m"
-    return ""
-
-
-def size_in(model: Model, effect: Effect) -> tuple[float, float]:
-    """Size of an effect in a model: its largest parameter over the smallest that matters, and over its sigma."""
-    size, t = 0.0, 0.0
-    for value, sigma, parameter in values_in(model, effect):
-        size = max(size, float(np.max(np.abs(value))) / max(parameter.matters, 1e-12))
-        t = max(t, float(np.max(np.abs(value) / sigma)))
-    return size, t
-
-
-def values_in(model: Model, effect: Effect) -> list[tuple[Floats, Floats, Parameter]]:
-    """Per free parameter of an effect: its values and sigmas, one of the vehicle's or one per run, and itself."""
+def sized_of(model: Model, posterior: Posterior) -> list[Sized]:
+    """What every effect of a model brings and how large it is."""
+    keys = [one.key for one in model.accepted]
     found = []
-    for parameter in Free(effect).parameters:
-        values, sigmas = [], []
-        for k, problem in enumerate(model.problems):
-            for j, name in enumerate(names_of(problem)):
-                if name != (effect.name, parameter.name):
-                    continue
-                shared = parameter.scope == "vehicle"
-                variance = model.fit.robust[3 + j, 3 + j] if shared else model.fit.runs[k].covariance[3 + j, 3 + j]
-                values.append(float(model.fit.each[k][3 + j]))
-                sigmas.append(float(np.sqrt(variance)))
-        if parameter.scope == "vehicle":
-            values, sigmas = values[:1], sigmas[:1]
-        if values:
-            found.append((np.array(values), np.array(sigmas), parameter))
+    for one in model.accepted:
+        values = values_in(model, one)
+        t = joint_t(model, one)
+        size = max(float(np.sqrt(np.mean(v**2))) / max(p.matters, 1e-12) for v, _, p in values)
+        moments = [row for other in model.accepted if other.run is not None for row in rows_of(model, other)]
+        # All evidence for a moment lies in it: no other part of the run can foretell it.
+        gain = np.inf if one.run is not None else held_out_gain(model.fit, rows_of(model, one), moments)
+        found.append(Sized(one, posterior.worth(one.key, keys), gain, t, size))
+    return found
+
+
+def rows_of(model: Model, accepted: Accepted) -> list[int]:
+    """Places of an effect's parameters, all runs' copies, in the model's joint fit."""
+    return [place for place, key in enumerate(model.fit.places.keys) if key[0] == accepted.key]
+
+
+def joint_t(model: Model, accepted: Accepted) -> float:
+    """Root of an effect's χ² less its degrees of freedom but one: for one parameter, its value over its sigma."""
+    rows = rows_of(model, accepted)
+    values = model.fit.values[rows]
+    covariance = model.fit.all_robust[np.ix_(rows, rows)]
+    hidden = np.array([_hidden(model, accepted.free, model.fit.places.keys[row]) for row in rows])
+    covariance = covariance + np.diag(hidden**2)
+    scale = np.sqrt(np.diag(covariance))
+    chi2 = float((values / scale) @ np.linalg.solve(covariance / np.outer(scale, scale), values / scale))
+    return float(np.sqrt(max(chi2 - (len(rows) - 1), 0.0)))
+
+
+def _hidden(model: Model, free: Free, key: Key) -> float:
+    """What no log shows of a parameter: of the vehicle's, what the run that shows most leaves."""
+    runs = range(len(model.problems)) if key[2] < 0 else [key[2]]
+    spans = [model.problems[run].aligned.span_s for run in runs]
+    parameter = next(one for one in free.parameters if one.name == key[1])
+    return free.effect.hidden_sigma(parameter, max(last - first for first, last in spans))
+
+
+def values_in(model: Model, accepted: Accepted) -> list[tuple[Floats, Floats, Parameter]]:
+    """Per free parameter of an effect: its values and sigmas, one of the vehicle's or one per run, and itself."""
+    fit = model.fit
+    sigmas = np.sqrt(np.diag(fit.all_robust))
+    found = []
+    for parameter in accepted.free.parameters:
+        rows = [k for k, key in enumerate(fit.places.keys) if key[:2] == (accepted.key, parameter.name)]
+        hidden = np.array([_hidden(model, accepted.free, fit.places.keys[row]) for row in rows])
+        found.append((fit.values[rows], np.hypot(sigmas[rows], hidden), parameter))
     return found

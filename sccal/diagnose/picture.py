@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats
-from sccal.calibration.extension import Free, view_run
-from sccal.diagnose.model import Model, names_of
 from sccal.diagnose.result import Picture
 from sccal.effects.effect import Column
 from sccal.effects.logged import LoggedColumn
-from sccal.effects.patterns import Pattern
 from sccal.effects.view import DriveView, Moments
+from sccal.evidence.extension import Free, view_run
+from sccal.evidence.model import Model
 
 BINS = 24
 LEAST = 3
@@ -59,45 +58,24 @@ ROLL = Cause("roll, deg", lambda v, at: np.degrees(np.interp(at.t_s, v.steps.t_s
 EAST = Cause("east, m", lambda _, at: at.east_m)
 
 _CAUSES: dict[str, Cause] = {
-    "lever_arm": HEADING,
-    "hard_iron": HEADING,
-    "soft_iron": HEADING,
-    "gnss_latency": SPEED,
-    "speed_field": SPEED,
-    "speed_slip": SPEED,
-    "heading_latency": TURN_RATE,
-    "turn_slip": TURN_RATE,
-    "turn_scrub": TURN_RATE,
-    "side_slip": TURN_RATE,
-    "brake_slip": ACCELERATION,
-    "drive_slip": ACCELERATION,
-    "slope": PITCH,
-    "roll_slip": ROLL,
-    "local_field": EAST,
+    "heading": HEADING,
+    "speed": SPEED,
+    "turn_rate": TURN_RATE,
+    "acceleration": ACCELERATION,
+    "time": TIME,
+    "pitch": PITCH,
+    "roll": ROLL,
+    "east": EAST,
 }
-_WORDS: tuple[tuple[str, Cause], ...] = (
-    ("heading", HEADING),
-    ("side of the", TURN_RATE),
-    ("turn rate", TURN_RATE),
-    ("speed", SPEED),
-    ("direction of travel", SPEED),
-    ("acceleration", ACCELERATION),
-    ("pitch", PITCH),
-    ("tilt", PITCH),
-    ("roll", ROLL),
-    ("place", EAST),
-)
 
 
 def cause_of(free: Free) -> Cause:
-    """The quantity that shows an effect best; time for what has none."""
+    """The quantity that shows an effect best, which the effect itself says."""
     effect = free.effect
     if isinstance(effect, LoggedColumn):
         column = effect.column
         return Cause(column, lambda view, at: view.logged_at(column, at.t_s))
-    if isinstance(effect, Pattern):
-        return next((cause for word, cause in _WORDS if effect.depends_on.startswith(word)), TIME)
-    return _CAUSES.get(effect.name, TIME)
+    return _CAUSES[effect.shown_against]
 
 
 def picture_of(before: Model, after: Model, free: Free, runs: list[int]) -> Picture | None:
@@ -121,11 +99,9 @@ def picture_of(before: Model, after: Model, free: Free, runs: list[int]) -> Pict
 
 
 def _values(model: Model, run: int, free: Free) -> list[float] | None:
-    names = names_of(model.problems[run])
-    wanted = [(free.effect.name, one.name) for one in free.parameters]
-    if not set(wanted) <= set(names):
-        return None
-    return [float(model.fit.each[run][3 + names.index(name)]) for name in wanted]
+    known = model.values(run)
+    wanted = [(free.key, one.name) for one in free.parameters]
+    return [known[name] for name in wanted] if set(wanted) <= set(known) else None
 
 
 def _port(model: Model, run: int, free: Free, values: list[float]) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Estimate, Noise, OutageWindow, Parameters
+from sccal.calibration.saved_model import SavedModel
 from sccal.logs.streams import Notice, Vehicle
 
 
@@ -42,7 +43,7 @@ class Ranked:
     title: str
     named: bool
     """False for a pattern without a name."""
-    held_out_gain_nats: float
+    evidence_nats: float
     t: float
     size: float
     """Largest parameter in units of the smallest size that matters."""
@@ -58,6 +59,8 @@ class Finding:
     parameters: Mapping[str, Estimate]
     units: Mapping[str, str]
     """Of each parameter, "1" for ratios."""
+    evidence_nats: float
+    """What it brings beside the others, the price of its own freedom paid (a logarithm of odds)."""
     held_out_gain_nats: float
     t: float
     indistinguishable_from: tuple[str, ...]
@@ -127,7 +130,7 @@ class Unexplained:
     depends_on: str = ""
     variance_fraction: float = 0.0
     """Share of the error variance at that port that the pattern holds."""
-    held_out_gain_nats: float = 0.0
+    evidence_nats: float = 0.0
     t: float = 0.0
     size: str = ""
     """In words: "up to 2.1 deg"."""
@@ -141,9 +144,9 @@ class Placebo:
     tried: int
     passed: int
     highest_nats: float
-    """Largest held-out gain of a nonsense column."""
+    """Most evidence that a nonsense column brought."""
     needed_nats: float
-    """What a finding needed in this log, at least."""
+    """What a finding needs, at least."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +166,6 @@ class Diagnosis:
     trust: str
     """How the measurements were trusted, in a sentence."""
     findings: tuple[Finding, ...]
-    patterns: tuple[str, ...]
-    """Patterns without a name that are in the model of ``after`` too: "antenna_forward with acceleration"."""
     taken_back: Mapping[str, str]
     """Candidates that passed the test and were taken back, and why."""
     not_excited: tuple[NotExcited, ...]
@@ -179,3 +180,5 @@ class Diagnosis:
     parameters_after: Parameters
     noises: tuple[RunNoise, ...]
     notices: tuple[Notice, ...]
+    model: SavedModel
+    """The model of ``after``, for other commands to start from."""

@@ -1,31 +1,68 @@
-"""How much of the error at a port a pattern without a name holds."""
+"""What is left and has no name: the pattern that the residuals of the final model follow most, if they follow one.
+
+All patterns are free beside the model, noise included, so that an error that nothing in the catalogue explains can no
+longer pass for noise; the evidence then says what each pattern alone would bring. None of them enters the model.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.extension import Free, view_run
-from sccal.diagnose.model import Model, names_of
-from sccal.effects.patterns import Pattern
+from sccal.diagnose.criteria import PATTERN_NATS, PRICE_NATS
+from sccal.diagnose.loop import Loop
+from sccal.diagnose.result import Unexplained
+from sccal.effects.patterns import PATTERNS, Pattern
+from sccal.evidence.extension import Free
+from sccal.evidence.model import Accepted, Model
+from sccal.evidence.saturated import saturate
+from sccal.filter.noise import Reach
 
 WINDOW_S = 10.0
 
 
-def variance_fraction(model: Model, pattern: Pattern, values: Floats | None) -> tuple[float, str]:
+def unexplained(loop: Loop) -> Unexplained:
+    """The strongest pattern beside the final model, where it is strong enough to be told."""
+    kept = list(loop.model.accepted)
+    patterns = {pattern.name: Accepted(Free(pattern)) for pattern in PATTERNS}
+    full = saturate(loop.model, [*kept, *patterns.values()], dict.fromkeys(patterns, PRICE_NATS), Reach.LOOK)
+    posterior, keys = full.posterior, [one.key for one in kept]
+    gains = {name: posterior.gain(name, keys) for name in patterns}
+    best = max(gains, key=lambda name: gains[name])
+    pattern = patterns[best].free.effect
+    assert isinstance(pattern, Pattern)
+    mean, covariance = posterior.given([*keys, best])
+    places = posterior.places([*keys, best])
+    mine = np.flatnonzero(np.isin(places, posterior.rows[best]))
+    least = max(one.matters / one.prior_sigma for one in pattern.parameters)
+    if gains[best] < PATTERN_NATS or float(np.abs(mean[mine]).max()) < least:
+        return Unexplained(False)
+    values = mean[mine] * posterior.sigma[posterior.rows[best]]
+    fraction, size = variance_fraction(loop.model, pattern, values)
+    t = float(np.sqrt(max(float(mean[mine] @ np.linalg.solve(covariance[np.ix_(mine, mine)], mean[mine])), 0.0)))
+    return Unexplained(
+        significant=True,
+        port=pattern.port,
+        depends_on=pattern.depends_on,
+        variance_fraction=fraction,
+        evidence_nats=gains[best],
+        t=t,
+        size=size,
+    )
+
+
+def variance_fraction(model: Model, pattern: Pattern, values: Floats) -> tuple[float, str]:
     """Share of the error's variance at the pattern's port that follows it, and its size in words.
 
-    ``values`` are the pattern's parameters where it is not in the model; None: those of the model. At the motion the
-    errors are sums over WINDOW_S, since one step says nothing.
+    ``values`` are the pattern's parameters. At the motion the errors are sums over WINDOW_S, since one step says
+    nothing.
     """
     explained, noise, most = [], [], 0.0
+    own = values.tolist()
     for run, problem in enumerate(model.problems):
         at = model.at(run)
-        free = Free(pattern)
-        known = dict(zip(names_of(problem), at.values.tolist(), strict=True))
-        own = [known.get((pattern.name, one.name), 0.0) for one in free.parameters] if values is None else list(values)
-        view = view_run(problem, at, problem.clear_steps(at.constants))
-        placed = [one for one in free.placed(view, own, 0) if one.column.port == pattern.port]
+        view = model.view(run)
+        placed = [one for one in Free(pattern).placed(view, own, 0) if one.column.port == pattern.port]
         added = sum(own[one.parameter] * one.column.values for one in placed)
         level = problem.noise
         if pattern.port == "heading":

@@ -30,6 +30,8 @@ class BaseShift(Effect):
     looks_like = "from one moment on all fixes stand beside the path by the same distance in the same direction"
     excited_by = "any drive shows it; drive on for a minute before and after the jump"
     reference = "RTCM 10403, messages 1005 and 1006: coordinates of the reference station"
+    search = "moment"
+    suspect_stream = "fixes"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         after = np.where(drive.fixes.t_s - drive.start_s > at["at_s"], 1.0, 0.0)

@@ -26,6 +26,7 @@ class BrakeSlip(Effect):
     looks_like = "each stop ends short of where the wheels say, in proportion to how hard it braked"
     excited_by = "brake hard as well as gently, from more than one speed"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"
+    shown_against = "acceleration"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sccal.effects.antenna_height import AntennaHeight
 from sccal.effects.base_shift import BaseShift
 from sccal.effects.brake_slip import BrakeSlip
 from sccal.effects.clock_skew import ClockSkew
@@ -12,6 +13,7 @@ from sccal.effects.gnss_latency import GnssLatency
 from sccal.effects.hard_iron import HardIron
 from sccal.effects.heading_drift import HeadingDrift
 from sccal.effects.heading_latency import HeadingLatency
+from sccal.effects.heading_scale import HeadingScale
 from sccal.effects.heading_step import HeadingStep
 from sccal.effects.lever_arm import LeverArm
 from sccal.effects.local_field import LocalField
@@ -23,6 +25,7 @@ from sccal.effects.side_slip import SideSlip
 from sccal.effects.slope import Slope
 from sccal.effects.soft_iron import SoftIron
 from sccal.effects.speed_field import SpeedField
+from sccal.effects.speed_offset import SpeedOffset
 from sccal.effects.speed_slip import SpeedSlip
 from sccal.effects.turn_scrub import TurnScrub
 from sccal.effects.turn_slip import TurnSlip
@@ -32,10 +35,12 @@ CATALOGUE: dict[str, Effect] = {
     effect.name: effect
     for effect in (
         LeverArm(),
+        AntennaHeight(),
         TurnSlip(),
         TurnScrub(),
         SideSlip(),
         SpeedSlip(),
+        SpeedOffset(),
         BrakeSlip(),
         DriveSlip(),
         Slope(),
@@ -52,6 +57,7 @@ CATALOGUE: dict[str, Effect] = {
         HardIron(),
         SoftIron(),
         HeadingDrift(),
+        HeadingScale(),
         SpeedField(),
         HeadingStep(),
         BaseShift(),
@@ -68,14 +74,31 @@ def effect_named(name: str) -> Effect:
 
 
 def parse_effect(text: str) -> tuple[Effect, dict[str, float]]:
-    """``lever_arm=0.3,-0.1``: the effect and its parameters' values in the order of ``sccal effects NAME``."""
+    """``lever_arm=0.3,-0.1``: the effect and its parameters' values in the order of ``sccal effects NAME``.
+
+    Shapes at the end that have a value of their own may be left out. Raises UsageError for anything else.
+    """
     name, equals, numbers = text.partition("=")
     effect = effect_named(name.strip())
-    names = [parameter.name for parameter in effect.parameters]
     try:
-        values = [float(number) for number in numbers.split(",")] if equals else []
+        told = [float(number) for number in numbers.split(",")] if equals else []
     except ValueError:
-        values = []
-    if len(values) != len(names):
-        raise UsageError(f"effect {text!r}: {effect.name} takes {len(names)} numbers: {effect.name}={','.join(names)}")
-    return effect, dict(zip(names, values, strict=True))
+        told = []
+    names = [parameter.name for parameter in effect.parameters]
+    least = _least(effect)
+    if not least <= len(told) <= len(names):
+        count = f"{least}" if least == len(names) else f"{least} to {len(names)}"
+        raise UsageError(f"effect {text!r}: {effect.name} takes {count} numbers: {assignment(effect)}")
+    unsaid = [parameter.left_out or 0.0 for parameter in effect.parameters[len(told) :]]
+    return effect, dict(zip(names, [*told, *unsaid], strict=True))
+
+
+def assignment(effect: Effect) -> str:
+    """How it is put into a simulated log, what may be left out in brackets: ``hard_iron=cos_deg,sin_deg[,tau_s]``."""
+    names, least = [parameter.name for parameter in effect.parameters], _least(effect)
+    return f"{effect.name}={','.join(names[:least])}" + "".join(f"[,{name}]" for name in names[least:])
+
+
+def _least(effect: Effect) -> int:
+    """How many numbers it has to be told."""
+    return max((k for k, one in enumerate(effect.parameters, 1) if one.left_out is None), default=0)

@@ -13,9 +13,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
-from sccal.effects.gnss_latency import late_fix
+from sccal.effects.gnss_latency import TRANSPORT_S, late_fix
 from sccal.effects.view import DriveView
 from sccal.simulate.physics import Physics, Sensor
 
@@ -31,6 +33,13 @@ class ClockSkew(Effect):
     looks_like = "fixes lag behind the path, or run ahead of it, in proportion to speed and more with every minute"
     excited_by = "drive for longer, keep moving, and stop or reverse 10 m now and then up to the end"
     reference = "Moon, Skelly and Towsley 1999, Estimation and removal of clock skew from network delay measurements"
+
+    def hidden_sigma(self, parameter: Parameter, duration_s: float) -> float:
+        """A transport time that changes over a run passes for a skew of that change over the run's length."""
+        return TRANSPORT_S / max(duration_s, 1.0) / _PER_PPM
+
+    def fix_delay_s(self, drive: DriveView, at: Mapping[str, float]) -> Floats:
+        return np.asarray(at["ppm"] * _PER_PPM * (drive.fixes.t_s - drive.start_s))
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         per_ppm_s = _PER_PPM * (drive.fixes.t_s - drive.start_s)

@@ -26,6 +26,7 @@ class DriveSlip(Effect):
     looks_like = "each start falls short of what the wheels say, in proportion to how hard it speeds up"
     excited_by = "speed up hard as well as gently, to more than one speed"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"
+    shown_against = "acceleration"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

@@ -22,6 +22,10 @@ Port = MotionPort | Literal["heading"] | FixPort
 """along, side, right_wheel, left_wheel in m, turn and heading in rad, the rest in m; see sccal.filter.kernel."""
 
 Scope = Literal["vehicle", "run"]
+Cause = Literal["heading", "speed", "turn_rate", "acceleration", "time", "pitch", "roll", "east"]
+"""What a residual may be drawn against."""
+Search = Literal["none", "scale", "moment", "place"]
+Stream = Literal["headings", "fixes", "motion"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,19 @@ class Parameter:
     """Smallest size worth telling anybody; smaller ones are taken as always possible."""
     shape: bool = False
     """True for a place, a time or a size that its column depends on nonlinearly: searched for, never filtered."""
+    default: float | None = None
+    """Of a shape: the value at which the effect is an ordinary linear candidate; None: it has to be searched for."""
+    unsaid: float | None = None
+    """Of a shape without default: its value in a simulation that is not told one; None: it has to be told."""
+    hidden_sigma: float = 0.0
+    """Part of its uncertainty that no log shows, in its unit."""
+
+    @property
+    def left_out(self) -> float | None:
+        """Its value in a simulation that is not told one; None where it has to be told."""
+        if not self.shape:
+            return None
+        return self.unsaid if self.default is None else self.default
 
 
 @dataclass(frozen=True)
@@ -64,13 +81,40 @@ class Effect(ABC):
     excited_by: str
     """What drive makes it visible, as advice: "turn both ways"."""
     reference: str
+    on_every_robot: bool = False
+    """Whether every robot with a receiver has some of it, so that a drive that cannot show it is worth a word."""
+    shown_against: Cause = "time"
+    """The quantity that its residual follows, to draw it against."""
+    search: Search = "none"
+    """How its shapes are found: a size on a grid and refined, a moment of the run, a place; none where it has none."""
+    suspect_stream: Stream = "motion"
+    """Of a moment or a place: the measurements whose innovations are large there."""
+
+    def hidden_sigma(self, parameter: Parameter, duration_s: float) -> float:
+        """Part of a parameter's uncertainty that no run of that length shows, in file units."""
+        return parameter.hidden_sigma
+
+    def shape_grid(self, drive: DriveView) -> tuple[Mapping[str, float], ...]:
+        """Few values of its shapes at which it competes as a linear candidate in this drive before they are refined.
+
+        For ``search`` "scale"; empty where no value of the shapes makes it anything that this drive could show.
+        """
+        return ()
+
+    def fix_delay_s(self, drive: DriveView, at: Mapping[str, float]) -> Floats | None:
+        """How much older the fixes are than their stamps say, (f,) s; None for effects that have nothing to do with it.
+
+        What else acts on the antenna then acts in the direction in which the robot stood that much earlier.
+        """
+        return None
 
     @abstractmethod
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         """Columns of all parameters that are not shapes; ``at`` holds the current values of all (file units).
 
-        Where the effect is not linear, a column is its derivative at zero and its secant elsewhere: value times column
-        is the whole effect at ``at``, so refitting with columns made at the last answer converges to the exact effect.
+        Where the effect is not linear, a column is its derivative at zero, and elsewhere values times columns add up to
+        the whole effect at ``at``: refitting with columns made at the last answer ends at the exact effect. A shape
+        with a value of its own (``left_out``) may be missing in ``at``.
         """
 
     @abstractmethod

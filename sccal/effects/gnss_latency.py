@@ -5,7 +5,8 @@ In the robot's frame at t, with the mean speed v and the mean turn rate ω of th
     fix += Rot(θ) τ v k (−cos(ωτ/2), sin(ωτ/2))      to first order: forward −v τ
 
 The columns are that divided by τ: times τ they give the whole chord at the value they were computed for, curvature and
-changes of speed included, and at zero they are the derivative. The arm's own turning about the robot is not in them.
+changes of speed included, and at zero they are the derivative. How an arm turns about the robot meanwhile is the
+fit's to put in, which knows the arm.
 """
 
 from __future__ import annotations
@@ -45,15 +46,24 @@ def late_fix(drive: DriveView, delay_s: Floats | float) -> tuple[Floats, Floats]
     return -chord * np.cos(half_turn), chord * np.sin(half_turn)
 
 
+TRANSPORT_S = 0.02
+"""What lines take to arrive, and how well a receiver's time and the computer's agree: no log shows it."""
+
+
 class GnssLatency(Effect):
     """Age of the fixes, s; above zero they are old."""
 
     name = "gnss_latency"
+    on_every_robot = True
     title = "fixes that show an earlier place than their stamp says"
-    parameters = (Parameter("s", "s", 0.2, -2.0, 2.0, "run", matters=0.07),)
+    parameters = (Parameter("s", "s", 0.2, -2.0, 2.0, "run", matters=0.07, hidden_sigma=TRANSPORT_S),)
     looks_like = "fixes lag behind the path in proportion to speed, and run ahead of it in reverse"
     excited_by = "drive at a second speed, or reverse 10 m: at one speed it is the same as a forward lever arm"
     reference = "Skog and Händel 2011, Time synchronization errors in loosely coupled GPS-aided inertial navigation"
+    shown_against = "speed"
+
+    def fix_delay_s(self, drive: DriveView, at: Mapping[str, float]) -> Floats:
+        return np.full(drive.fixes.t_s.size, at["s"])
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         forward, left = late_fix(drive, at["s"])

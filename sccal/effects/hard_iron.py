@@ -4,11 +4,11 @@ With ψ the robot's heading in enu and c, s the added field in parts of the eart
 the left (so that both are angles for small ones), the reading is wrong by
 
     h = atan2(N, D)      N = c cos ψ + s sin ψ      D = 1 + c sin ψ − s cos ψ
+    heading += h'        τ dh'/dt = h − h'        c and s in degrees of field: 57.3 are as strong as the earth
 
-to first order N itself. The filter adds p · column, which is linear, and h is not: at 20° the harmonics alone leave a
-sixth of the amplitude, in the second harmonic. So the columns are secants: the harmonics times q = h/N at the current
-values (1 where they are zero). Times those same values they give h exactly, c q cos ψ + s q sin ψ = h, and at zero they
-are the derivatives. Estimating and computing the columns anew, again and again, ends where both agree: at the truth.
+to first order N itself. The files hold c and s times 180/π, so that weak iron turns the reading by so many degrees.
+An AHRS that lets its compass in slowly shows h', after a first-order filter of time constant τ. As h is not linear in c
+and s the columns are made anew at the last answer, see sccal.effects.compass.
 """
 
 from __future__ import annotations
@@ -19,54 +19,56 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Floats
+from sccal.effects.compass import TAU, let_in, of_tau, slow_deviation_columns, tried_taus
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
 
-def deviation_secants(angle_rad: Floats, cos_deg: float, sin_deg: float) -> tuple[Floats, Floats]:
-    """rad per deg of a compass's cosine and sine deviation in ``angle_rad``, exact at the values given."""
-    c, s = np.radians(cos_deg), np.radians(sin_deg)
-    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    across, along = c * cos + s * sin, 1.0 + c * sin - s * cos
-    small = np.abs(across) < 1e-9
-    safe = np.where(small, 1.0, across)
-    secant = np.where(small, 1.0 / np.maximum(along, 1e-3), np.arctan2(across, along) / safe)
-    return np.radians(secant * cos), np.radians(secant * sin)
-
-
 class HardIron(Effect):
-    """Deviation of the compass with the cosine and the sine of the robot's heading, deg."""
+    """The added field with the cosine and the sine of the robot's heading, deg of field, and the AHRS's slowness, s."""
 
     name = "hard_iron"
     title = "magnetised parts near the compass"
     parameters = (
-        Parameter("cos_deg", "deg", 10.0, -40.0, 40.0, matters=0.03),
-        Parameter("sin_deg", "deg", 10.0, -40.0, 40.0, matters=0.03),
+        Parameter("cos_deg", "deg", 10.0, -100.0, 100.0, matters=0.03),
+        Parameter("sin_deg", "deg", 10.0, -100.0, 100.0, matters=0.03),
+        TAU,
     )
     looks_like = "the heading error swings once per full turn of the robot: one way going east, the other going west"
     excited_by = "drive in at least eight headings: full circles, or spin in place both ways by whole turns"
     reference = "NGA Pub. 226, Handbook of Magnetic Compass Adjustment: coefficients B and C"
+    shown_against = "heading"
+    search = "scale"
+
+    def shape_grid(self, drive: DriveView) -> tuple[Mapping[str, float], ...]:
+        """Time constants that the drive is long enough for."""
+        return tried_taus(drive)
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
-        cos, sin = deviation_secants(drive.headings.yaw_rad, at["cos_deg"], at["sin_deg"])
+        tau_s = at.get("tau_s", 0.0)
+        cos, sin = slow_deviation_columns(drive.headings, 1.0, at["cos_deg"], at["sin_deg"], tau_s)
         return (Column("cos_deg", "heading", cos), Column("sin_deg", "heading", sin))
 
     def physics(self, values: Mapping[str, float]) -> Physics:
-        return _Magnetised(values["cos_deg"], values["sin_deg"])
+        return _Magnetised(values["cos_deg"], values["sin_deg"], values.get("tau_s", 0.0))
 
 
 @dataclass(frozen=True)
 class _Magnetised(Physics):
     cos_deg: float
     sin_deg: float
+    tau_s: float
 
     def truth(self) -> Mapping[str, Mapping[str, float]]:
-        return {"hard_iron": {"cos_deg": self.cos_deg, "sin_deg": self.sin_deg}}
+        return {"hard_iron": {"cos_deg": self.cos_deg, "sin_deg": self.sin_deg, **of_tau(self.tau_s)}}
 
     def heading(self, state: State, reading_rad: Floats) -> Floats:
+        return np.asarray(reading_rad + let_in(state, self._deviation, self.tau_s))
+
+    def _deviation(self, yaw_rad: Floats) -> Floats:
         """The field as the robot sees it: forward + i left, the earth's pointing north."""
-        earth = 1j * np.exp(-1j * state.yaw_rad)
+        earth = 1j * np.exp(-1j * yaw_rad)
         own = np.radians(self.cos_deg) - 1j * np.radians(self.sin_deg)
-        return np.asarray(reading_rad - np.angle((earth + own) / earth))
+        return np.asarray(-np.angle((earth + own) / earth))

@@ -29,6 +29,8 @@ class HeadingStep(Effect):
     looks_like = "the heading offset has one value up to a moment and another one from there on"
     excited_by = "keep moving, with straights of 20 m before and after the jump"
     reference = "Basseville and Nikiforov 1993, Detection of Abrupt Changes: additive jump of a mean"
+    search = "moment"
+    suspect_stream = "headings"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         after = drive.headings.t_s - drive.start_s > at["at_s"]

@@ -21,6 +21,7 @@ class LeverArm(Effect):
     """Forward and left of the antenna, m."""
 
     name = "lever_arm"
+    on_every_robot = True
     title = "antenna off the middle between the wheels"
     parameters = (
         Parameter("forward_m", "m", 0.5, -5.0, 5.0, matters=0.04),
@@ -31,6 +32,7 @@ class LeverArm(Effect):
     )
     excited_by = "turn both ways; spin in place for the forward part, which at one speed is the same as a GNSS latency"
     reference = "geometry; see Cantelli et al. 2016, section 3, for the model that lacks it"
+    shown_against = "heading"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         one = np.ones(drive.fixes.t_s.size)

@@ -31,6 +31,9 @@ class LocalField(Effect):
     looks_like = "the heading is wrong whenever the robot passes one place, and right elsewhere"
     excited_by = "pass the place several times, in different directions and at a second speed"
     reference = "Angermann et al. 2012, Characterization of the indoor magnetic field for applications in localization"
+    shown_against = "east"
+    search = "place"
+    suspect_stream = "headings"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         seen = drive.headings

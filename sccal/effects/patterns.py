@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.effects.effect import Column, Effect, Parameter, Port
+from sccal.effects.effect import Cause, Column, Effect, Parameter, Port
 from sccal.effects.view import DriveView
 from sccal.errors import UsageError
 from sccal.simulate.physics import Physics
@@ -21,6 +21,18 @@ PRIOR = {"heading": 0.1, "turn": 0.1, "along": 0.05, "side": 0.05}
 """rad of heading; share of the turning or of the travel."""
 PRIOR_M = 0.3
 REACH = 20.0
+_SHOWN: tuple[tuple[str, Cause], ...] = (
+    ("heading", "heading"),
+    ("side of the", "turn_rate"),
+    ("turn rate", "turn_rate"),
+    ("speed", "speed"),
+    ("direction of travel", "speed"),
+    ("acceleration", "acceleration"),
+    ("pitch", "pitch"),
+    ("roll", "roll"),
+    ("place", "east"),
+)
+"""What a residual is drawn against, by how the quantity that it follows begins; time for all others."""
 
 Shapes = Callable[[DriveView], Sequence[Floats]]
 
@@ -32,11 +44,12 @@ class Pattern(Effect):
     excited_by = "let the quantity vary while everything else stays as it is"
     reference = "regression of the innovations"
 
-    def __init__(self, port: Port, depends_on: str, shapes: Shapes, count: int, prior: float | None = None) -> None:
+    def __init__(self, port: Port, depends_on: str, shapes: Shapes, count: int) -> None:
         self.port, self.depends_on, self.shapes = port, depends_on, shapes
         self.name = f"{port} with {depends_on}"
         self.title = f"{port} follows {depends_on}"
-        sigma = PRIOR.get(port, PRIOR_M) if prior is None else prior
+        self.shown_against = next((cause for word, cause in _SHOWN if depends_on.startswith(word)), "time")
+        sigma = PRIOR.get(port, PRIOR_M)
         unit = {"heading": "rad"}.get(port, "1")
         self.parameters = tuple(
             Parameter(f"p{k}", unit, sigma, -REACH * sigma, REACH * sigma, matters=0.05 * sigma) for k in range(count)
@@ -51,15 +64,6 @@ class Pattern(Effect):
     def physics(self, values: Mapping[str, float]) -> Physics:
         """Raises UsageError: a pattern is a description, not a cause."""
         raise UsageError(f"effect {self.name}: a pattern cannot be simulated")
-
-
-class _TiltedMast(Pattern):
-    """An antenna high above the ground: nose up it goes back, left side up it goes right."""
-
-    def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
-        name, steps = self.parameters[0].name, drive.steps
-        back, right = (np.sin(drive.at_fixes(tilt)) for tilt in (steps.pitch_rad, steps.roll_rad))
-        return (Column(name, "antenna_forward", -back), Column(name, "antenna_left", -right))
 
 
 def _harmonics(angle: Floats, order: int) -> list[Floats]:
@@ -145,7 +149,6 @@ def _other_patterns() -> list[Pattern]:
         Pattern("side", "time", lambda d: [d.steps.along_m * one for one in _waves(d, d.steps.t_s, 3)], 3),
         Pattern("antenna_forward", "acceleration", lambda d: [d.fixes.acceleration_mps2], 1),
         Pattern("antenna_left", "turn rate", lambda d: [d.fixes.turn_rate_radps], 1),
-        _TiltedMast("antenna_forward", "tilt", lambda d: [], 1, 2.0),
         Pattern("east", "time", lambda d: _waves(d, d.fixes.t_s, 4), 4),
         Pattern("north", "time", lambda d: _waves(d, d.fixes.t_s, 4), 4),
     ]

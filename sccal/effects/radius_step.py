@@ -29,6 +29,8 @@ class RadiusStep(Effect):
     looks_like = "both radii jump at one moment and stay there"
     excited_by = "drive straights before and after the change, at the same speed"
     reference = "loaded against unloaded wheel radius; geometry"
+    search = "moment"
+    suspect_stream = "motion"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

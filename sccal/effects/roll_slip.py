@@ -27,6 +27,7 @@ class RollSlip(Effect):
     looks_like = "the path drifts to the low side on slopes, whichever way they are crossed; fixes pull it back uphill"
     excited_by = "drive across a slope of 5° or more in both directions, with an AHRS that logs roll"
     reference = "statics of a wheel that creeps under a side load; slope slip of tracked vehicles"
+    shown_against = "roll"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps
@@ -63,4 +64,4 @@ class _Downhill(Physics):
 
     def tilt(self, state: State, pitch_rad: Floats, roll_rad: Floats) -> tuple[Floats, Floats]:
         _, roll = HILLS.tilt(state.east_m, state.north_m, state.yaw_rad)
-        return pitch_rad, roll_rad + roll
+        return pitch_rad, roll

@@ -30,6 +30,7 @@ class SideSlip(Effect):
     reference = (
         "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014; lateral dynamics of cars for the term v ω"
     )
+    shown_against = "turn_rate"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

@@ -28,6 +28,7 @@ class Slope(Effect):
     looks_like = "both radii seem smaller on steep stretches, uphill and downhill alike"
     excited_by = "drive up and down a slope of 5° or more, and on level ground, with an AHRS that logs pitch"
     reference = "geometry: the level part of a slanted way is its cosine"
+    shown_against = "pitch"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps
@@ -51,4 +52,4 @@ class _Slanted(Physics):
 
     def tilt(self, state: State, pitch_rad: Floats, roll_rad: Floats) -> tuple[Floats, Floats]:
         pitch, _ = HILLS.tilt(state.east_m, state.north_m, state.yaw_rad)
-        return pitch_rad + pitch, roll_rad
+        return pitch, roll_rad

@@ -26,6 +26,7 @@ class SpeedField(Effect):
     looks_like = "the heading offset changes when the robot stops, drives at another speed or reverses"
     excited_by = "drive at a second speed, stop now and then, and reverse 10 m"
     reference = "Ozyagcilar, NXP AN4247, Layout recommendations for PCBs using a magnetometer: fields of currents"
+    shown_against = "speed"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         return (Column("deg_per_mps", "heading", np.radians(drive.headings.speed_mps)),)

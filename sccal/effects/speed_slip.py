@@ -26,6 +26,7 @@ class SpeedSlip(Effect):
     looks_like = "both radii seem smaller on fast stretches than on slow ones"
     excited_by = "drive at a second speed: the same kind of straight, slow and fast"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"
+    shown_against = "speed"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

@@ -28,6 +28,7 @@ class TurnScrub(Effect):
     )
     excited_by = "drive tight arcs as well as straights, both ways and at two turn rates"
     reference = "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014, on skid-steered turning"
+    shown_against = "turn_rate"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

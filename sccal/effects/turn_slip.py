@@ -26,6 +26,7 @@ class TurnSlip(Effect):
     looks_like = "the track seems wider in fast turns than in slow ones; the heading jumps back after each turn"
     excited_by = "turn at two clearly different rates, both ways: slow arcs and fast spins in place"
     reference = "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014, on skid-steered turning"
+    shown_against = "turn_rate"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

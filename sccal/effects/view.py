@@ -32,6 +32,9 @@ class Steps:
     right_angle_rad: Floats
     """Cumulative angle of the right wheel from the log's first sample, in the middle of the step."""
     left_angle_rad: Floats
+    right_rate_radps: Floats
+    """Of the right wheel, as counted."""
+    left_rate_radps: Floats
     pitch_rad: Floats
     """Nose up; 0 where the AHRS does not give it."""
     roll_rad: Floats
@@ -122,9 +125,9 @@ def view_drive(
     along, turn = 0.5 * (right + left), (right - left) / belief.track_m
     half = 0.5 * SMOOTH_S
 
-    def rate(cumulative: Floats, at_s: Floats) -> Floats:
-        first, last = np.maximum(at_s - half, t[0]), np.minimum(at_s + half, t[-1])
-        change = np.interp(last, t, cumulative) - np.interp(first, t, cumulative)
+    def rate(cumulative: Floats, at_s: Floats, times: Floats = t) -> Floats:
+        first, last = np.maximum(at_s - half, times[0]), np.minimum(at_s + half, times[-1])
+        change = np.interp(last, times, cumulative) - np.interp(first, times, cumulative)
         return np.asarray(change / np.maximum(last - first, 1e-9))
 
     def acceleration(at_s: Floats) -> Floats:
@@ -158,6 +161,8 @@ def view_drive(
         acceleration_mps2=acceleration(middle),
         right_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.right_rad),
         left_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.left_rad),
+        right_rate_radps=rate(aligned.right_rad, middle, aligned.wheel_t_s),
+        left_rate_radps=rate(aligned.left_rad, middle, aligned.wheel_t_s),
         pitch_rad=zeros if pitch is None else np.interp(middle, aligned.heading_t_s, pitch),
         roll_rad=zeros if roll is None else np.interp(middle, aligned.heading_t_s, roll),
     )

@@ -1,4 +1,4 @@
-"""Parameter lines for an ArduPilot rover (NAME,VALUE; metres): wheel encoders, and the antenna where it was located.
+"""Parameter lines for an ArduPilot rover (NAME,VALUE; metres): wheel encoders, antenna and age of the fixes.
 
 Names and signs: the parameter tables of AP_WheelEncoder.cpp, AP_GPS_Params.cpp and AP_Compass.cpp in
 github.com/ArduPilot/ardupilot, and ardupilot.org/rover/docs/wheel-encoder.html. ArduPilot's body frame is forward,
@@ -19,6 +19,10 @@ from sccal.export.result import Result
 from sccal.results.numbers import one_line
 from sccal.results.saved import SavedEstimate
 
+MOST_DELAY_MS = 250
+CERTAIN = 2.0
+"""Sigmas from which on an age of the fixes is set in place of the receiver's default."""
+
 
 def write_ardupilot(result: Result) -> str:
     """The parameters of one vehicle; what was not estimated stands as a comment, so that loading leaves it alone."""
@@ -36,6 +40,7 @@ def write_ardupilot(result: Result) -> str:
         *_line("WENC_POS_Y", -0.5, "minus half of the track,", track),
         *_line("WENC2_POS_Y", 0.5, "half of the track,", track),
         *_antenna(result.saved.effects.get("lever_arm")),
+        *_delay(result.saved.effects.get("gnss_latency")),
         *_heading(parameters["heading_offset_deg"]),
     ]
     return "\n".join(lines) + "\n"
@@ -56,6 +61,27 @@ def _antenna(lever_arm: Mapping[str, SavedEstimate] | None) -> list[str]:
         "# Before ArduPilot 4.6 these are GPS_POS1_X and GPS_POS1_Y.",
         *_line("GPS1_POS_X", 1.0, "antenna forward", lever_arm["forward_m"]),
         *_line("GPS1_POS_Y", -1.0, "minus antenna left,", lever_arm["left_m"]),
+    ]
+
+
+def _delay(latency: Mapping[str, SavedEstimate] | None) -> list[str]:
+    """Whole milliseconds within what the parameter may hold, where 0 stands for the receiver's default."""
+    if latency is None:
+        return []
+    age = latency["s"]
+    if not usable(age):
+        return [f"# GPS1_DELAY_MS left as it is: {why_not(age)}"]
+    if not abs(age.value) > CERTAIN * age.sigma:
+        return [f"# GPS1_DELAY_MS left as it is: the fixes' age, {with_sigma(age, 's')}, may as well be zero"]
+    milliseconds = round(1e3 * age.value)
+    if not 1 <= milliseconds <= MOST_DELAY_MS:
+        return [
+            f"# GPS1_DELAY_MS left as it is: fixes are {with_sigma(age, 's')} old, and it holds 1 to {MOST_DELAY_MS} ms"
+        ]
+    return [
+        f"# age of the fixes {with_sigma(age, 's')} against their stamps in the log: right if those are",
+        "# ArduPilot's own times of arrival. Before ArduPilot 4.6 it is GPS_DELAY_MS.",
+        f"GPS1_DELAY_MS,{milliseconds}",
     ]
 
 

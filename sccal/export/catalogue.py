@@ -53,10 +53,10 @@ FORMATS = {
         ),
         Format(
             "ardupilot",
-            "parameter lines for a rover: wheel encoders, the antenna's place",
+            "parameter lines for a rover: encoders, antenna, age of the fixes",
             write_ardupilot,
             (*_GEOMETRY, "heading_offset_deg"),
-            ("lever_arm",),
+            ("lever_arm", "gnss_latency"),
         ),
         Format("geojson", "the path for QGIS, geojson.io and web maps", write_geojson),
         Format("kml", "the path for Google Earth, with times", write_kml),

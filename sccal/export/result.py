@@ -13,8 +13,10 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.geodesy import TangentPlane
+from sccal.results.document import read_document
+from sccal.results.model import MODEL_FILE, MODEL_SCHEMA, read_saved_model
 from sccal.results.numbers import one_line
-from sccal.results.saved import Saved, SavedTrajectory, read_saved, read_trajectory
+from sccal.results.saved import RESULT_FILE, VEHICLE_FILE, Saved, SavedTrajectory, read_saved, read_trajectory
 
 CLOCKS_AGREE_S = 60.0
 """Between the path's first time in UTC and the start that calibration.json tells, which has whole seconds and is that
@@ -32,7 +34,10 @@ class Result:
         """Vehicle and run, on one line, for titles and comments."""
         saved = self.saved
         if saved.of_vehicle:
-            return one_line(f"vehicle {saved.vehicle}, {len(saved.document.get('runs', ()))} runs together")
+            count = len(saved.document.get("runs", ()))
+            runs = f"{count} run{'' if count == 1 else 's'}"
+            what = f"model of {runs}" if saved.document["schema"] == MODEL_SCHEMA else f"{runs} together"
+            return one_line(f"vehicle {saved.vehicle}, {what}")
         return one_line(f"vehicle {saved.vehicle}, run {saved.run}")
 
     @cached_property
@@ -40,13 +45,11 @@ class Result:
         """The middle between the wheels in the tangent plane, each (n,), n > 0.
 
         Raises:
-            UsageError: the result is that of a vehicle.
+            UsageError: the result is that of a vehicle, or a model.
             DataError: trajectory.csv is missing, damaged or empty.
         """
         if self.saved.of_vehicle:
-            raise UsageError(
-                f"{self.saved.path}: several runs together have no path; name the folder of one run, as OUT/run"
-            )
+            raise UsageError(f"{self.saved.path}: runs together have no path; name the folder of one run, as OUT/run")
         folder = self.saved.path.parent
         trajectory = read_trajectory(folder)
         if trajectory.t_s.size == 0:
@@ -77,7 +80,8 @@ class Result:
     @cached_property
     def lat_lon_deg(self) -> tuple[Floats, Floats]:
         """The path's latitudes and longitudes on WGS 84, each (n,); longitudes in [-180, 180)."""
-        lat_deg, lon_deg = self.plane.to_lat_lon(self.trajectory.east_m, self.trajectory.north_m)
+        path = self.trajectory
+        lat_deg, lon_deg = self.plane.to_lat_lon(path.east_m, path.north_m)
         return np.round(lat_deg, 9), wrapped_lon_deg(np.round(lon_deg, 9))
 
     @cached_property
@@ -107,12 +111,16 @@ class Result:
 
 
 def read_result(path: Path) -> Result:
-    """The result in a JSON file, or in the folder that holds calibration.json or vehicle.json.
+    """The result in a JSON file, or in the folder that holds calibration.json, vehicle.json or model.json.
 
     Raises:
         UsageError: nothing of that name, or a folder without results.
-        DataError: no calibration of the schema.
+        DataError: neither a calibration nor a model of the schemas.
     """
+    if path.is_dir() and not any((path / name).is_file() for name in (RESULT_FILE, VEHICLE_FILE)):
+        path = path / MODEL_FILE if (path / MODEL_FILE).is_file() else path
+    if path.is_file() and read_document(path)[1] == MODEL_SCHEMA:
+        return Result(read_saved_model(path))
     return Result(read_saved(path))
 
 

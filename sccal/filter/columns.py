@@ -46,8 +46,18 @@ class Placed:
     column: ColumnLike
 
 
-def kernel_columns(placed: Sequence[Placed], timeline: Timeline) -> Columns:
+@dataclass(frozen=True)
+class HeadingBend:
+    """What makes the heading's columns exact where effects are not linear; (h,) each, see sccal.filter.kernel."""
+
+    known_rad: Floats
+    slope: Floats
+    at_rad: Floats
+
+
+def kernel_columns(placed: Sequence[Placed], timeline: Timeline, bend: HeadingBend | None = None) -> Columns:
     """The kernel's columns; the rows of each column must be those of its port."""
+    straight = np.zeros(timeline.heading_index.size)
 
     def stack(chosen: list[Placed], rows: int) -> Floats:
         return np.array([one.column.values for one in chosen]).T.copy() if chosen else np.zeros((rows, 0))
@@ -61,6 +71,9 @@ def kernel_columns(placed: Sequence[Placed], timeline: Timeline) -> Columns:
         motion_param=np.array([one.parameter for one in motion], dtype=np.int32),
         heading=stack(heading, timeline.heading_index.size),
         heading_param=np.array([one.parameter for one in heading], dtype=np.int32),
+        heading_known=straight if bend is None else bend.known_rad,
+        heading_slope=straight if bend is None else bend.slope,
+        heading_at=straight if bend is None else bend.at_rad,
         fix=stack(fix, timeline.fix_index.size),
         fix_port=np.array([FIX_PORTS[one.column.port] for one in fix], dtype=np.int32),
         fix_param=np.array([one.parameter for one in fix], dtype=np.int32),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,39 +19,17 @@ from sccal.filter.layout import (
     MEM_RECOVERIES,
     MEMORY_SIZE,
     REPORTED_STATES,
+    Belief,
     Columns,
     Events,
     Model,
     Output,
 )
+from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start
 
 NUMERIC_RANGE = 5.0
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Levels and correlation times of the measurement errors that the filter uses, and where they come from.
-
-    An error is white plus a first-order Gauss-Markov part (standard deviation ``coloured``, correlation time ``tau``).
-    """
-
-    heading_white_rad: float
-    heading_coloured_rad: float
-    heading_tau_s: float
-    fix_scale: float
-    """Factor on the stated (or table) sigma of the fixes of the leading quality: their white part in this log."""
-    fix_coloured_m: float
-    fix_tau_s: float
-    slip_m_per_sqrt_m: float
-    """Random travel error of each wheel: standard deviation after one metre, growing with the root of distance."""
-    source: str = "estimated"
-    """estimated or given."""
-    other_fix_scale: Mapping[int, float] = field(default_factory=dict)
-    """The same factor for fixes of another quality (GGA code to factor)."""
-    fix_stated_m: float = float("nan")
-    """Median of the stated (or table) sigma of the leading fixes, which fix_scale multiplies."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +40,7 @@ class ForwardPass:
     state: Floats
     """(m, 7) x, y, θ, R_r, R_l, L, Ofs at Timeline.out_t_s."""
     sigma: Floats
-    """(m, 7) standard deviations of the same."""
+    """(m, 7) standard deviations of the same; (0, 7) where nobody asked."""
     final_state: Floats
     """(n,) the kernel's whole state after the last event."""
     final_covariance: Floats
@@ -109,29 +86,35 @@ class Filter:
         linear_at: Constants | None = None,
         columns: Columns | None = None,
         effects: int = 0,
+        with_sigmas: bool = True,
     ) -> None:
         self.timeline = timeline
         self.options = options
         self.states = BASE_STATES + effects
         self.events = make_events(aligned, timeline, noise, clear)
         self.columns = kernel_columns((), timeline) if columns is None else columns
-        self.model = make_model(centre, options, noise, self.states, linear_at)
-        self.output = self.make_output(with_states=True)
-        self.x = np.zeros(self.states)
-        self.P = np.zeros((self.states, self.states))
+        self.model = make_model(centre, options, noise, linear_at)
+        self.output = self.make_output(with_states=True, with_sigmas=with_sigmas)
+        self.belief = Belief(
+            np.zeros(BASE_STATES),
+            np.zeros(effects),
+            np.zeros((BASE_STATES, BASE_STATES)),
+            np.zeros((BASE_STATES, effects)),
+            np.zeros((effects, effects)),
+        )
         self.memory = np.zeros(MEMORY_SIZE)
         self.position = 0
         self.blind: tuple[tuple[int, int], ...] = ()
         """Ranges of events, in order, whose fixes are predicted and compared but teach nothing."""
 
-    def make_output(self, with_states: bool) -> Output:
+    def make_output(self, with_states: bool, with_sigmas: bool = True) -> Output:
         """Room for what a pass leaves."""
         h, f = self.events.yaw_rad.size, self.events.fix_east_m.size
         m = self.timeline.out_t_s.size if with_states else 0
         nan = np.full
         return Output(
             state=np.zeros((m, REPORTED_STATES)),
-            sigma=np.zeros((m, REPORTED_STATES)),
+            sigma=np.zeros((m if with_sigmas else 0, REPORTED_STATES)),
             heading_nu=nan(h, np.nan),
             heading_var=nan(h, np.nan),
             heading_ok=np.zeros(h, dtype=np.bool_),
@@ -149,20 +132,20 @@ class Filter:
         """
         options = self.options
         offset = start.offset_rad if options.with_offset else 0.0
-        self.x[:] = 0.0
-        self.x[:3] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
-        self.x[3:6] = constants.as_array()
-        self.x[6] = offset
-        self.x[BASE_STATES:] = values
+        x = np.zeros(BASE_STATES)
+        x[:3] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
+        x[3:6] = constants.as_array()
+        x[6] = offset
         variance = np.zeros(self.states)
         variance[:2] = start.sigma_position_m**2
         variance[2] = start.sigma_yaw_rad**2
         variance[6] = options.offset_prior_rad**2 if options.with_offset else 0.0
         variance[7] = self.model.heading_coloured_var
         variance[8:10] = self.model.fix_coloured_var
-        self.P[:] = np.diag(variance)
+        covariance = np.diag(variance)
         learnt = np.r_[3:6, BASE_STATES : self.states]
-        self.P[np.ix_(learnt, learnt)] = prior
+        covariance[np.ix_(learnt, learnt)] = prior
+        self.belief = self.belief._replace(x=x, p=values.copy()).begun(covariance)
         self.memory[:] = 0.0
         self.memory[: MEM_FIX_T + 1] = self.events.t_s[0]
         self.output.total[:] = 0.0
@@ -182,8 +165,7 @@ class Filter:
                 self.events,
                 self.columns,
                 self.model,
-                self.x,
-                self.P,
+                self.belief,
                 self.memory,
                 self.position,
                 last,
@@ -201,8 +183,7 @@ class Filter:
             self.events,
             self.columns,
             self.model,
-            self.x.copy(),
-            self.P.copy(),
+            self.belief.copied(),
             self.memory.copy(),
             self.position,
             last,
@@ -218,8 +199,8 @@ class Filter:
             timeline=self.timeline,
             state=out.state,
             sigma=out.sigma,
-            final_state=self.x.copy(),
-            final_covariance=self.P.copy(),
+            final_state=np.concatenate((self.belief.x, self.belief.p)),
+            final_covariance=self.belief.covariance(),
             heading_nu_rad=out.heading_nu,
             heading_var_rad2=out.heading_var,
             heading_accepted=out.heading_ok,
@@ -248,11 +229,9 @@ def numeric_limits(centre: Constants) -> tuple[Floats, Floats]:
     return middle / NUMERIC_RANGE, middle * NUMERIC_RANGE
 
 
-def make_model(
-    centre: Constants, options: FilterOptions, noise: Noise, states: int, linear_at: Constants | None = None
-) -> Model:
+def make_model(centre: Constants, options: FilterOptions, noise: Noise, linear_at: Constants | None = None) -> Model:
     """The kernel's numbers; without ``linear_at``, derivatives are taken at the running estimate."""
-    walk = np.zeros(states)
+    walk = np.zeros(BASE_STATES)
     walk[3:5] = (options.radius_walk * centre.radius_right_m) ** 2
     walk[5] = (options.track_walk * centre.track_m) ** 2
     walk[6] = options.offset_walk_rad**2 if options.with_offset else 0.0
@@ -285,6 +264,7 @@ def make_events(aligned: Aligned, timeline: Timeline, noise: Noise, clear: tuple
     else:
         relative = aligned.yaw_sigma_rad[heading] / np.median(aligned.yaw_sigma_rad)
         yaw_var = (noise.heading_white_rad * np.clip(relative, 0.1, 100.0)) ** 2
+    floor_east_m, floor_north_m = aligned.fix_floor_m
     scale2 = np.full(fix.size, noise.fix_scale**2)
     for code, factor in noise.other_fix_scale.items():
         scale2[aligned.fix_quality[fix] == code] = factor**2
@@ -302,7 +282,8 @@ def make_events(aligned: Aligned, timeline: Timeline, noise: Noise, clear: tuple
         yaw_var_rad2=yaw_var,
         fix_east_m=aligned.fix_east_m[fix],
         fix_north_m=aligned.fix_north_m[fix],
-        fix_var_east_m2=aligned.fix_var_east_m2[fix] * scale2,
-        fix_var_north_m2=aligned.fix_var_north_m2[fix] * scale2,
+        # No level takes away what the digits of the coordinates leave.
+        fix_var_east_m2=np.maximum(aligned.fix_var_east_m2[fix] * scale2, floor_east_m**2),
+        fix_var_north_m2=np.maximum(aligned.fix_var_north_m2[fix] * scale2, floor_north_m**2),
         fix_cov_m2=aligned.fix_cov_m2[fix] * scale2,
     )

@@ -7,21 +7,27 @@ posterior mode (as in the iterated Kalman filter, Bell and Cathey 1993).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
 from sccal.align import Aligned, Timeline, clear_steps
 from sccal.arrays import Floats
+from sccal.errors import DataError
 from sccal.filter.columns import kernel_columns
-from sccal.filter.forward import Filter, ForwardPass, Noise, numeric_limits, prior_covariance
+from sccal.filter.forward import Filter, ForwardPass, numeric_limits, prior_covariance
 from sccal.filter.layout import BASE_STATES, Columns
+from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
-from sccal.filter.start import Constants, Start, first_constants
+from sccal.filter.start import Constants, Start, find_start, first_constants
 
 MAX_ROUNDS = 6
 CLOSE_SIGMAS = 0.05
+WORSE_NATS, MOST_HALVINGS = 3.0, 5
+"""A step after which the data are less likely by more than what linearising elsewhere changes is halved, so often."""
+TURNS_THE_START_RAD = np.radians(1.0)
+"""Effects that turn the heading by less while the robot sets off are within the start's own sigma."""
 SAME_RATIO = 1e-4
 """R_r/R_l known so well leaves less turn in a straight line than slip does."""
 
@@ -97,18 +103,36 @@ class RunProblem:
         """The extension's columns, or none."""
         return kernel_columns((), self.timeline) if self.extension is None else self.extension.columns(self, at, clear)
 
+    def start_given(self, columns: Columns, values: Floats) -> Start:
+        """Where the run begins if the heading holds what the effects put there: iron turns the first heading too."""
+        if not columns.heading_param.size:
+            return self.start
+        added = columns.heading @ values[columns.heading_param] + columns.heading_known
+        t_s = self.aligned.heading_t_s[self.timeline.heading_index]
+        first = added[: max(int(np.searchsorted(t_s, self.start.until_s)), 1)]
+        if np.ptp(first) < TURNS_THE_START_RAD:
+            return self.start
+        yaw = self.aligned.yaw_rad - np.interp(self.aligned.heading_t_s, t_s, added)
+        try:
+            return find_start(replace(self.aligned, yaw_rad=yaw))
+        except DataError:  # the effects stand where no robot could be: what was found without them is nearer
+            return self.start
+
     def begun(
         self,
         at: At,
         linearise_there: bool = False,
         clear: tuple[Floats, Floats] | None = None,
         columns: Columns | None = None,
+        with_sigmas: bool = True,
     ) -> Filter:
         """A filter at the first event, its priors around the given values.
 
-        ``clear`` and ``columns`` spare their computation where they are known already.
+        ``clear`` and ``columns`` spare their computation where they are known already; without sigmas the outputs hold
+        states alone, which spares much where there are many effects.
         """
         clear = self.clear_steps(at.constants) if clear is None else clear
+        columns = self.columns(at, clear) if columns is None else columns
         run = Filter(
             self.aligned,
             self.timeline,
@@ -117,14 +141,17 @@ class RunProblem:
             self.centre,
             clear,
             at.constants if linearise_there else None,
-            self.columns(at, clear) if columns is None else columns,
+            columns,
             self.extra,
+            with_sigmas,
         )
-        run.begin(self.start, at.constants, self.prior, at.values)
+        run.begin(self.start_given(columns, at.values), at.constants, self.prior, at.values)
         return run
 
 
-def iterate(problem: RunProblem, first: At, max_rounds: int = MAX_ROUNDS) -> tuple[Floats, ForwardPass]:
+def iterate(
+    problem: RunProblem, first: At, max_rounds: int = MAX_ROUNDS, with_sigmas: bool = True
+) -> tuple[Floats, ForwardPass]:
     """Posterior mode of R_r, R_l, L, Ofs and the extension's parameters (4 + m,), and the pass linearised there.
 
     A pass that starts at x* with prior covariance P0 treats x* as the prior mean. To first order the posterior with
@@ -132,24 +159,53 @@ def iterate(problem: RunProblem, first: At, max_rounds: int = MAX_ROUNDS) -> tup
     """
     information = np.linalg.inv(problem.prior)
     lower, upper = numeric_limits(problem.centre)
-    theta = np.concatenate((np.clip(first.constants.as_array(), lower, upper), first.values))
     learnt = np.r_[0:3, 4 : 4 + problem.extra]
-    path = first.path
+    at = At(Constants.of(np.clip(first.constants.as_array(), lower, upper)), first.values, first.path)
     clear, ratio = None, np.inf
-    for _ in range(max_rounds):
-        at = At(Constants.of(theta), theta[3:], path)
+    best: tuple[float, At, ForwardPass, Floats] | None = None
+    halvings = 0
+    for _ in range(max_rounds + MOST_HALVINGS):
+        theta = np.concatenate((at.constants.as_array(), at.values))
         if clear is None or abs(theta[0] / theta[1] - ratio) > SAME_RATIO:
             clear, ratio = problem.clear_steps(at.constants), float(theta[0] / theta[1])
-        found = problem.begun(at, True, clear).finish()
+        found = problem.begun(at, True, clear, with_sigmas=with_sigmas).finish()
+        cost = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found)
+        if best is not None and not cost < best[0] + WORSE_NATS:
+            # The step went too far: half of it, from where the data were likeliest.
+            if halvings >= MOST_HALVINGS:
+                break
+            halvings += 1
+            before = np.concatenate((best[1].constants.as_array(), best[1].values))
+            theta = 0.5 * (theta + before)
+            at = At(Constants.of(theta), theta[3:], best[1].path)
+            continue
         covariance = reported_covariance(found)
         mode = reported_values(found) + covariance[:, learnt] @ information @ (problem.prior_mean - theta)
         mode[:3] = np.clip(mode[:3], lower, upper)
         moved = np.abs(mode[learnt] - theta) / np.sqrt(np.maximum(np.diag(covariance)[learnt], 1e-30))
-        theta = mode[learnt]
-        path = found if problem.extra else None
-        if moved.max() < CLOSE_SIGMAS:
+        best = cost, at, found, mode
+        max_rounds -= 1
+        if moved.max() < CLOSE_SIGMAS or max_rounds <= 0:
             break
-    return mode, found
+        at = At(Constants.of(mode[learnt]), mode[learnt][3:], found if problem.extra else None)
+    assert best is not None
+    return best[3], best[2]
+
+
+def prior_shift_nats(problem: RunProblem, at: At, found: ForwardPass) -> float:
+    """What the negative log-likelihood of a pass lacks because its priors stood around its start, not their own mean.
+
+    A pass that starts at x* has the prior N(x*, P0) and leaves the posterior N(x* + e, P). Under the prior N(m0, P0),
+    with d = m0 − x*, the data's likelihood is the posterior mean of the ratio of the two priors:
+
+        shift = ½ dᵀ P0⁻¹ d − ½ dᵀ P0⁻¹ P P0⁻¹ d − dᵀ P0⁻¹ e
+    """
+    learnt = np.r_[0:3, 4 : 4 + problem.extra]
+    theta = np.concatenate((at.constants.as_array(), at.values))
+    away = np.linalg.solve(problem.prior, problem.prior_mean - theta)
+    covariance = reported_covariance(found)[np.ix_(learnt, learnt)]
+    moved = reported_values(found)[learnt] - theta
+    return float(0.5 * away @ problem.prior @ away - 0.5 * away @ covariance @ away - away @ moved)
 
 
 def reported_values(found: ForwardPass) -> Floats:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from sccal.arrays import Bools, Floats, Rows
 
 X, Y, THETA, RADIUS_RIGHT, RADIUS_LEFT, TRACK, OFFSET, HEADING_BIAS, EAST_BIAS, NORTH_BIAS = range(10)
@@ -17,6 +19,39 @@ PORT_ANTENNA_FORWARD, PORT_ANTENNA_LEFT, PORT_EAST, PORT_NORTH = range(4)
 MEM_HEADING_T, MEM_FIX_T, MEM_FIX_REJECTED, MEM_FIX_SINCE, MEM_HEADING_REJECTED, MEM_HEADING_SINCE = range(6)
 MEM_RECOVERIES, MEM_FIX_LEVEL, MEM_ACCEPTED_SINCE = 6, 7, 8
 MEMORY_SIZE = 9
+
+
+class Belief(NamedTuple):
+    """What a pass believes: the core state, the effects' parameters, and how they hang together.
+
+    P = core + slope · params · slopeᵀ is the covariance of the core state with the parameters marginalised, and
+    slope · params its covariance with them (Friedland 1969; Bierman 1977, chapter VIII).
+    """
+
+    x: Floats  # (10,)
+    p: Floats  # (m,) parameters of effects, in file units
+    core: Floats  # (10, 10) covariance of the core state if the parameters were known
+    slope: Floats  # (10, m) how the core state's estimate would move with each parameter
+    params: Floats  # (m, m) covariance of the parameters
+
+    def copied(self) -> Belief:
+        """The same, in arrays of its own."""
+        return Belief(*(part.copy() for part in self))
+
+    def covariance(self) -> Floats:
+        """(10 + m, 10 + m) of the core state and the parameters together."""
+        together = self.slope @ self.params
+        return np.block([[self.core + together @ self.slope.T, together], [together.T, self.params]])
+
+    def begun(self, covariance: Floats) -> Belief:
+        """The same means with another covariance (10 + m, 10 + m)."""
+        n = BASE_STATES
+        core, params, across = covariance[:n, :n].copy(), covariance[n:, n:].copy(), covariance[:n, n:]
+        if not across.any():
+            return Belief(self.x, self.p, core, np.zeros_like(across), params)
+        slope = np.ascontiguousarray(across @ np.linalg.pinv(params, hermitian=True))
+        core -= slope @ params @ slope.T
+        return Belief(self.x, self.p, 0.5 * (core + core.T), slope, params)
 
 
 class Events(NamedTuple):
@@ -41,13 +76,16 @@ class Events(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Effect columns by the room they act in; ``param`` counts from 0 and adds BASE_STATES to give the state."""
+    """Effect columns by the room they act in; ``param`` is the place of the parameter in Belief.p."""
 
     motion: Floats  # (n, km), rows as Events.t_s
     motion_port: Rows  # (km,) int32
     motion_param: Rows  # (km,) int32
     heading: Floats  # (h, kh), rad per unit of the parameter
     heading_param: Rows  # (kh,) int32
+    heading_known: Floats  # (h,) rad, added whatever the parameters are
+    heading_slope: Floats  # (h,) how much more than by itself a reading turns with the robot: iron's deviation does
+    heading_at: Floats  # (h,) rad, the heading about which that holds
     fix: Floats  # (f, kf)
     fix_port: Rows  # (kf,) int32
     fix_param: Rows  # (kf,) int32
@@ -61,7 +99,7 @@ class Model(NamedTuple):
     heading_tau_s: float
     fix_coloured_var: float  # m²
     fix_tau_s: float
-    walk: Floats  # (n,) variance rate of each state, unit² per s (parameters only)
+    walk: Floats  # (10,) variance rate of each core state, unit² per s (R_r, R_l, L and Ofs only)
     linear: Floats  # (3,) R_r, R_l, L at which their derivatives are taken; not positive: at the current estimate
     lower: Floats  # (3,) bounds of R_r, R_l, L
     upper: Floats  # (3,)
@@ -77,7 +115,7 @@ class Output(NamedTuple):
     """What a pass fills; rows of one call range are written, the others left."""
 
     state: Floats  # (m, REPORTED_STATES)
-    sigma: Floats  # (m, REPORTED_STATES)
+    sigma: Floats  # (m, REPORTED_STATES), or (0, REPORTED_STATES) where nobody asks
     heading_nu: Floats  # (h,) rad, NaN where not reached
     heading_var: Floats  # (h,) innovation variance S
     heading_ok: Bools  # (h,) bool, accepted

@@ -1,73 +1,82 @@
 """How noisy this log is: levels and correlation times that make its innovations most likely.
 
 White, hand-set sigmas make a filter far too sure: the error of an AHRS stays for 10 to 30 s, that of a fix for minutes.
-The heading error and the fix error are each white noise plus a first-order Gauss-Markov process; each wheel's slip is a
-random walk along the distance. The seven numbers maximise the likelihood of the innovations (Schweppe 1965) of the
-filter itself over a stretch of the run, with wide log-normal priors that only matter where the log says nothing.
+The levels (see sccal.filter.levels) maximise the likelihood of the innovations (Schweppe 1965) of the filter itself,
+which marginalises constants and effects, over a stretch of the run in which the robot moves.
+
+The likelihood has several hills: a heading that wanders, fixes that wander and wheels that slip can each carry the
+blame for the same errors. So it is looked at all over the prior first, at points that leave no large hole (the additive
+recurrence of Roberts 2018, which generalises the golden ratio), and climbed from the best of them, one after another,
+until two climbs have ended together. Thinned measurements show the hill; all of them then settle where its top is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import product
+from enum import Enum
+from typing import Protocol, TypeVar
 
 import numba
 import numpy as np
-from scipy.optimize import Bounds, minimize
+from scipy.special import ndtri
 
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
 from sccal.arrays import Bools, Floats
-from sccal.filter.forward import Noise
-from sccal.filter.iterate import At, Extension, RunProblem, iterate
-from sccal.filter.layout import Columns
+from sccal.filter.iterate import At, Extension, RunProblem, iterate, prior_shift_nats
+from sccal.filter.levels import Levels, Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, coarse_constants
 
 STRETCH_S = 480.0
-WHEEL_RATE_HZ = 20.0
-FIX_RATE_HZ = 5.0
-MAX_CLIMBS = 3
-WORTH_ANOTHER_CLIMB = 5.0
-SETTLED_HILLS = 3
-WANDERS = 3.0
-CLOSE_TOPS = 20.0
-"""Nats within which a thinned log does not decide between two tops."""
-SAME_SLIP = 0.1
-FAST = (0, 3, 4, 6)
-"""White heading, both levels of the fixes and slip, among Noise's fields: what a thinned log shows least well."""
-DIFFERENCE = 0.02
-REACH = 2.5
-"""Of one climb, in logarithms: a factor of twelve."""
+"""So much of a run shows seven numbers; more of it costs more and shows little more."""
+COARSE_HZ = (2.0, 1.0, 5.0)
+"""Headings, fixes and wheels of the thinned log."""
+PATH_HZ = 2.0
+"""Of the path, along which effects of the heading are laid out."""
+FINE_FIX_HZ, FINE_WHEEL_HZ = 5.0, 20.0
+POINTS = 96
+SPREAD = 1.4
+"""Of the points, in widths of the prior: they reach into its tails, where the odd log is."""
+MOST_CLIMBS = 6
+TOGETHER_NATS = 1.0
+"""Ends of two climbs that are nearer than this are one."""
+ROUNDS = 3
+DIFFERENCE, CURVATURE_STEP = 0.01, 0.05
+"""Steps of the finite differences in the logarithms: below what any level is known to."""
+LEAST_CURVATURE = 0.25
+"""That of a prior of width two, the widest in the table."""
+MOST_STEPS, LONGEST_STEP, SETTLED_NATS = 25, 1.5, 0.1
+SHARES = (1.0, 0.4)
+"""Of a step, tried at once."""
+MOST_FAILURES = 3
 NORMAL_MAD = 1.4826
 DEFAULT_COLOURED_TAU_S = 30.0
 
 
+class Reach(Enum):
+    """How many points of the prior a search looks at before it climbs."""
+
+    WIDE = POINTS
+    FEW = 24
+    """Where a noise near the right one is known, but another hill may have become the higher one."""
+    NEAR = 0
+    """Where the noise can only move a little: one climb from what is known."""
+    LOOK = -1
+    """The same on the thinned log alone, for a quick look."""
+
+
 @dataclass(frozen=True)
-class _Scale:
-    """Prior of the logarithm of one level: its centre, its width, and hard limits."""
+class End:
+    """Where a climb ended: its cost, the levels' logarithms, and the constants and effects fitted to them."""
 
-    centre: float
-    width: float
-    low: float
-    high: float
-
-
-def _scales(fix_sigma_m: float) -> tuple[_Scale, ...]:
-    """In the order of Noise's first seven fields; fix_sigma_m is the leading quality's typical sigma."""
-    return (
-        _Scale(np.radians(0.2), 1.5, np.radians(0.005), np.radians(30.0)),
-        _Scale(np.radians(0.7), 1.2, np.radians(0.005), np.radians(60.0)),
-        _Scale(25.0, 0.8, 1.0, 300.0),
-        _Scale(1.0, 2.0, 0.001, 1000.0),
-        _Scale(fix_sigma_m, 1.5, 1e-4, 100.0),
-        _Scale(40.0, 0.5, 2.0, 600.0),
-        _Scale(0.005, 1.5, 2e-4, 1.0),
-    )
+    cost: float
+    logs: Floats
+    at: At
 
 
 def estimate_noise(
@@ -77,40 +86,44 @@ def estimate_noise(
     heading_rate_hz: float,
     extension: Extension | None = None,
     first: At | None = None,
-) -> Noise:
-    """The log's own noise: first rough constants under assumed noise, then the noise given them.
+    near: Sequence[Noise] = (),
+    reach: Reach = Reach.WIDE,
+) -> tuple[Noise, At]:
+    """The log's own noise, given the effects in ``extension``.
 
-    ``first`` are constants and effects known already, to start from instead.
+    Parameters
+    ----------
+    aligned, start
+        The run and where it begins.
+    options
+        Priors of the constants; measurements are weighed softly whatever they say.
+    heading_rate_hz
+        Readings beyond this rate are left out.
+    extension
+        Effects that are free beside the noise, so that it need not explain what they do; None for none.
+    first
+        Constants and effects known already, to linearise at.
+    near
+        Noises known already, as further points to start from.
+    reach
+        How much of the prior is looked at before climbing.
 
-    A coarse search over thinned measurements finds the right hill (a correlated fix error and a slipping wheel can
-    both carry the blame); a fine one over all of them then settles what their number changes: white levels and slip.
+    Returns
+    -------
+    tuple[Noise, At]
+        The most likely levels, with how far the two best climbs end apart, and constants and effects as they came out
+        beside them over the stretch that was looked at.
     """
-    soft = replace(options, soft_gate=True)
-    likelihood = _Likelihood(aligned, start, soft, extension)
-    begin = aligned.span_s[0]
-    still = start.moving_from_s - begin
-    stretch = (begin, (start.moving_from_s if still > 0.25 * STRETCH_S else begin) + STRETCH_S)
-    coarse = build_timeline(aligned, 0.01, 2.0, 1.0, stretch, 5.0)
-    fine = build_timeline(aligned, 0.01, heading_rate_hz, FIX_RATE_HZ, stretch, WHEEL_RATE_HZ)
-
-    rough = first
-    if rough is None:
-        rough = likelihood.problem(coarse, likelihood.centre).at_centre(coarse_constants(aligned, start))
-    ordered = likelihood.best_of(coarse, likelihood.hills(), rough)
-    cost, level, at = likelihood.climbed(coarse, ordered[:SETTLED_HILLS], rough)
-    if first is not None or not likelihood.wanders(level):
-        return likelihood.noise(likelihood.climb_smoothly(fine, level, at))
-    # Where the model lacks something, a thinned log hardly tells a heading that wanders from wheels that slip; all its
-    # measurements do.
-    far = [hill for hill in ordered if abs(hill[6] - ordered[0][6]) > SAME_SLIP]
-    tops = [(cost, level, at), likelihood.climbed(coarse, far[:SETTLED_HILLS], rough)]
-    least = min(cost for cost, _, _ in tops)
-    ends = []
-    for cost, level, at in tops:
-        if cost < least + CLOSE_TOPS:
-            end = likelihood.climb_smoothly(fine, level, at)
-            ends.append((likelihood.settled(fine, end, at)[0], end))
-    return likelihood.noise(min(ends, key=lambda one: one[0])[1])
+    search = Search(aligned, start, replace(options, soft_gate=True), extension)
+    coarse, fine = search.timelines(heading_rate_hz)
+    rough = first or search.problem(coarse, search.levels.centre).at_centre(coarse_constants(aligned, start))
+    known = [search.levels.logs(one) for one in near]
+    if reach in (Reach.NEAR, Reach.LOOK):
+        found = search.climbed(fine if reach is Reach.NEAR else coarse, known[0], rough)
+        return search.noise(found.logs), found.at
+    best, apart = search.top(coarse, known, rough, reach)
+    found = search.climbed(fine, best.logs, best.at)
+    return replace(search.noise(found.logs), apart_nats=apart), found.at
 
 
 @dataclass(frozen=True)
@@ -126,118 +139,96 @@ class _Remembering(RunProblem):
         return self.known_steps[key]
 
 
-class _Likelihood:
-    """Negative log-posterior of the noise levels' logarithms for one run."""
+class Search:
+    """Negative log-posterior of the noise levels' logarithms for one run, and the way to its least."""
 
     def __init__(
         self, aligned: Aligned, start: Start, options: FilterOptions, extension: Extension | None = None
     ) -> None:
         self.aligned, self.start, self.options, self.extension = aligned, start, options, extension
         self.fix_sigma_m = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
-        scales = _scales(self.fix_sigma_m)
-        self.centre = np.log([s.centre for s in scales])
-        self.width = np.array([s.width for s in scales])
-        self.low = np.log([s.low for s in scales])
-        self.high = np.log([s.high for s in scales])
-        self.free = np.ones(self.centre.size, dtype=bool)
-        if not options.with_offset:
-            self.free[[1, 2]] = False
+        self.levels = Levels.of(self.fix_sigma_m, aligned.yaw_floor_rad, options.with_offset)
         self.others = _other_scales(aligned, start)
         self.known_steps: dict[tuple[int, float], tuple[Floats, Floats]] = {}
 
-    def noise(self, logs: Floats) -> Noise:
-        white, coloured, tau, scale, fix_coloured, fix_tau, slip = (float(v) for v in np.exp(logs))
-        return Noise(
-            white, coloured, tau, scale, fix_coloured, fix_tau, slip, "estimated", self.others, self.fix_sigma_m
-        )
+    def timelines(self, heading_rate_hz: float) -> tuple[Timeline, Timeline]:
+        """The thinned log and the full one, over the stretch that shows the noise."""
+        begin = self.aligned.span_s[0]
+        still = self.start.moving_from_s - begin
+        stretch = (begin, (self.start.moving_from_s if still > 0.25 * STRETCH_S else begin) + STRETCH_S)
+        heading_hz, fix_hz, wheel_hz = COARSE_HZ
+        coarse = build_timeline(self.aligned, PATH_HZ, min(heading_hz, heading_rate_hz), fix_hz, stretch, wheel_hz)
+        return coarse, build_timeline(self.aligned, PATH_HZ, heading_rate_hz, FINE_FIX_HZ, stretch, FINE_WHEEL_HZ)
 
-    def hills(self) -> list[Floats]:
-        """Starting points: who may carry the blame for what white noise does not explain."""
-        white = _white_level_m(self.aligned, self.start, self.aligned.fix_leading)
-        white = max(white if np.isfinite(white) else self.fix_sigma_m, 1e-4)
-        points = []
-        for coloured, slip, heading_rad in product((0.1, 1.0, 5.0, 25.0), (0.002, 0.01), np.radians((0.5, 5.0))):
-            point = self.centre.copy()
-            point[1] = np.log(heading_rad)
-            point[3] = np.log(white / self.fix_sigma_m)
-            point[4] = np.log(coloured * white)
-            point[6] = np.log(slip)
-            points.append(np.clip(point, self.low, self.high))
-        return points
+    def noise(self, logs: Floats) -> Noise:
+        """The levels as the filter takes them."""
+        return replace(self.levels.noise(logs), other_fix_scale=self.others, fix_stated_m=self.fix_sigma_m)
 
     def problem(self, timeline: Timeline, logs: Floats) -> RunProblem:
-        return _Remembering(
-            self.aligned, timeline, self.start, self.noise(logs), self.options, self.extension, self.known_steps
-        )
+        """The run under some noise."""
+        noise = self.noise(logs)
+        return _Remembering(self.aligned, timeline, self.start, noise, self.options, self.extension, self.known_steps)
 
-    def cost(
-        self, problem: RunProblem, logs: Floats, at: At, clear: tuple[Floats, Floats], columns: Columns | None = None
-    ) -> float:
-        found = problem.begun(at, True, clear, columns).finish()
-        prior = 0.5 * float((((logs - self.centre) / self.width)[self.free] ** 2).sum())
-        value = found.nll_heading + found.nll_fix + prior
-        return value if np.isfinite(value) else 1e12
+    def points(self) -> list[Floats]:
+        """Low-discrepancy points all over the prior."""
+        levels = self.levels
+        ratio = _generalised_golden_ratio(levels.centre.size)
+        alpha = ratio ** -np.arange(1.0, levels.centre.size + 1.0)
+        unit = np.modf(0.5 + np.outer(np.arange(1.0, POINTS + 1.0), alpha))[0]
+        spread = levels.centre + SPREAD * levels.width * ndtri(np.clip(unit, 1e-3, 1.0 - 1e-3))
+        return list(np.clip(spread, levels.low, levels.high))
+
+    def top(self, timeline: Timeline, near: Sequence[Floats], at: At, reach: Reach) -> tuple[End, float]:
+        """The best end of several climbs, and by how much the next best is worse (nats)."""
+        points = [*near, self.levels.centre, *self.points()[: reach.value]]
+        with at_once() as map_at_once:
+            costs = np.array(list(map_at_once(self._cost_at(timeline, points[0], at), points)))
+        ends: list[End] = []
+        for place in np.argsort(costs)[:MOST_CLIMBS]:
+            ends.append(self.climbed(timeline, points[int(place)], at))
+            ends.sort(key=lambda end: end.cost)
+            if len(ends) > 1 and ends[1].cost - ends[0].cost < TOGETHER_NATS:
+                break
+        return ends[0], ends[1].cost - ends[0].cost
+
+    def climbed(self, timeline: Timeline, logs: Floats, at: At) -> End:
+        """From a point to the top of its hill: levels and constants in turns."""
+        cost, at = self.settled(timeline, logs, at)
+        for _ in range(ROUNDS):
+            climbed = self._climb(timeline, logs, at)
+            before = cost
+            settled, there = self.settled(timeline, climbed, at)
+            if settled < cost:
+                cost, logs, at = settled, climbed, there
+            if cost > before - 0.5 * TOGETHER_NATS:
+                break
+        return End(cost, logs, at)
 
     def settled(self, timeline: Timeline, logs: Floats, at: At) -> tuple[float, At]:
         """Cost at given noise with the constants fitted to it, and these."""
         problem = self.problem(timeline, logs)
-        mode, found = iterate(problem, at, max_rounds=2)
+        mode, found = iterate(problem, at, max_rounds=2, with_sigmas=False)
         fitted = At(Constants.of(mode), mode[4:], found if problem.extra else None)
         candidates = (at, fitted)
-        costs = [self.cost(problem, logs, one, problem.clear_steps(one.constants)) for one in candidates]
+        costs = [self._cost_at(timeline, logs, one)(logs) for one in candidates]
         better = int(np.argmin(costs))
         return costs[better], candidates[better]
 
-    def best_of(self, timeline: Timeline, points: list[Floats], at: At) -> list[Floats]:
-        """The points in order of their cost at the given constants."""
-        cost = self._cost_at(timeline, points[0], at)
-        return sorted(points, key=cost)
+    def cost(self, timeline: Timeline, logs: Floats, at: At) -> float:
+        """Negative log-posterior of some levels, the constants and effects marginalised about where they are."""
+        return self._cost_at(timeline, logs, at)(logs)
 
-    def wanders(self, logs: Floats) -> bool:
-        """Whether the fixes err slowly by more than receivers do: the path is not what the model says."""
-        return bool(logs[4] > np.log(WANDERS * self.fix_sigma_m))
-
-    def climbed(self, timeline: Timeline, hills: list[Floats], at: At) -> tuple[float, Floats, At]:
-        """From the best of the hills to the top: cost, levels, and the constants fitted to them."""
-        settled = [(self.settled(timeline, hill, at), hill) for hill in hills]
-        (cost, at), level = min(settled, key=lambda one: one[0][0])
-        for _ in range(MAX_CLIMBS):
-            level = self.climb(timeline, level, at)
-            before = cost
-            cost, at = self.settled(timeline, level, at)
-            if cost > before - WORTH_ANOTHER_CLIMB:
-                break
-        return cost, level, at
-
-    def climb(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
-        """The most likely levels from a far starting point, the constants' linearisation fixed (Powell)."""
+    def _climb(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
+        """The most likely levels from a point, the linearisation fixed."""
+        free = self.levels.free
         whole = self._cost_at(timeline, logs, at)
-        start = logs[self.free]
-        # Its line searches look at the whole range between the bounds, which far away holds other hills.
-        near = Bounds(np.maximum(self.low[self.free], start - REACH), np.minimum(self.high[self.free], start + REACH))
-
-        def cost(part: Floats) -> float:
-            return whole(_with(logs, self.free, part))
-
-        options = {"maxfev": 250, "xtol": 0.1, "ftol": 1e-4}
-        found = minimize(cost, start, method="Powell", bounds=near, options=options)
-        return _with(logs, self.free, found.x) if found.fun < cost(start) else logs
-
-    def climb_smoothly(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
-        """The fast levels from a near point (L-BFGS-B). The kernel frees the GIL, so differences share the cores."""
-        fast = np.isin(np.arange(logs.size), FAST)
-        whole = self._cost_at(timeline, logs, at)
-        options = {"maxiter": 5, "maxls": 5, "ftol": 1e-6}
-        limits = Bounds(self.low[fast], self.high[fast])
         with at_once() as map_at_once:
 
-            def cost_and_slope(part: Floats) -> tuple[float, Floats]:
-                points = [part, *(part + DIFFERENCE * unit for unit in np.eye(part.size))]
-                here, *beside = map_at_once(lambda point: whole(_with(logs, fast, point)), points)
-                return here, (np.array(beside) - here) / DIFFERENCE
+            def costs(points: Sequence[Floats]) -> Floats:
+                return np.array(list(map_at_once(lambda point: whole(_with(logs, free, point)), list(points))))
 
-            found = minimize(cost_and_slope, logs[fast], jac=True, method="L-BFGS-B", bounds=limits, options=options)
-        return _with(logs, fast, found.x)
+            found = descend(costs, logs[free], self.levels.low[free], self.levels.high[free])
+        return _with(logs, free, found)
 
     def _cost_at(self, timeline: Timeline, logs: Floats, at: At) -> Callable[[Floats], float]:
         """Cost of any levels, the linearisation and all that depends on it computed once."""
@@ -246,13 +237,81 @@ class _Likelihood:
         columns = problem.columns(at, clear)
 
         def cost(level: Floats) -> float:
-            return self.cost(self.problem(timeline, level), level, at, clear, columns)
+            problem = self.problem(timeline, level)
+            found = problem.begun(at, True, clear, columns, with_sigmas=False).finish()
+            value = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found) + self.levels.price(level)
+            return value if np.isfinite(value) else 1e12
 
         return cost
 
 
+def descend(costs: Callable[[Sequence[Floats]], Floats], start: Floats, low: Floats, high: Floats) -> Floats:
+    """The least of a smooth function within bounds (k,), by a quasi-Newton method (BFGS; Nocedal and Wright 2006, 6.1).
+
+    ``costs`` evaluates several points at once, which is what several cores are good for. The curvatures along the axes,
+    by second differences, begin the matrix: they differ by a factor of a thousand between levels that thousands of
+    readings show and levels that the prior holds.
+    """
+    here, k = np.clip(start, low, high), start.size
+    inside = np.clip(here, low + CURVATURE_STEP, high - CURVATURE_STEP)
+    sides = costs([inside, *(inside + CURVATURE_STEP * one for one in np.vstack((np.eye(k), -np.eye(k))))])
+    middle, up, down = sides[0], sides[1 : k + 1], sides[k + 1 :]
+    curvature = np.maximum((up - 2.0 * middle + down) / CURVATURE_STEP**2, LEAST_CURVATURE)
+    here, cost, slope = inside, middle, (up - down) / (2.0 * CURVATURE_STEP)
+    inverse = np.diag(1.0 / curvature)
+    failures = 0
+    for _ in range(MOST_STEPS):
+        held = ((here <= low) & (slope > 0.0)) | ((here >= high) & (slope < 0.0))
+        step = np.where(held, 0.0, -inverse @ np.where(held, 0.0, slope))
+        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
+        expected = -float(slope @ step)
+        if expected < SETTLED_NATS:
+            break
+        points = [np.clip(here + share * step, low, high) for share in SHARES]
+        tried = costs(points)
+        best = int(np.argmin(tried))
+        if not tried[best] < cost:
+            # The matrix promises what the function does not hold: begin anew with a sixteenth of the first step.
+            failures += 1
+            if failures > MOST_FAILURES:
+                break
+            inverse = np.diag(1.0 / curvature) / 16.0**failures
+            continue
+        moved = points[best] - here
+        gained, here, cost = cost - tried[best], points[best], float(tried[best])
+        signs = np.where(here + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
+        beside = costs([here + sign * one for sign, one in zip(signs, np.eye(k), strict=True)])
+        turned = (beside - cost) / signs - slope
+        slope = slope + turned
+        bend = float(turned @ moved)
+        if bend > 1e-10:
+            left = np.eye(k) - np.outer(moved, turned) / bend
+            inverse = left @ inverse @ left.T + np.outer(moved, moved) / bend
+        if gained < SETTLED_NATS:
+            break
+    return here
+
+
+def _generalised_golden_ratio(dimensions: int) -> float:
+    """The positive root of x^(d+1) = x + 1."""
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (dimensions + 1.0))
+    return ratio
+
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class MapAtOnce(Protocol):
+    """``map`` for functions that leave the interpreter free most of the time."""
+
+    def __call__(self, function: Callable[[Item], Result], items: Iterable[Item], /) -> Iterable[Result]: ...
+
+
 @contextmanager
-def at_once() -> Iterator[Callable[[Callable[[Floats], float], list[Floats]], Iterable[float]]]:
+def at_once() -> Iterator[MapAtOnce]:
     """A ``map`` whose calls share the cores that this process may use; in processes of their own they have one."""
     cores = min(numba.get_num_threads(), 4)
     if cores < 2:

@@ -78,6 +78,8 @@ def _compared(gate: Gate, saved: Saved, measured: float | str) -> GateResult:
 def _why_missing(name: str, saved: Saved) -> str:
     if name.startswith("outage.") and not saved.document.get("outage", {}).get("windows"):
         return f"{name} has no value: no outage window fits into the run"
+    if name.startswith("held_out.") and saved.document.get("held_out") is None:
+        return f"{name} has no value: no window without fixes fits into what is left out of the fit"
     return f"{name} has no value"
 
 

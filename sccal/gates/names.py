@@ -28,6 +28,7 @@ FIXED: Mapping[str, tuple[str, ...]] = {
         "recoveries",
     ),
     "outage": ("window_s", "windows", "rms_m", "end_rms_m", "percent_of_distance", "how"),
+    "held_out": ("outage_rms_m", "outage_end_rms_m", "how"),
     "parameters": tuple(f"{key}{field}" for key in PARAMETERS for field in ("", *(f".{field}" for field in FIELDS))),
 }
 """Blocks whose names are known before any document is there."""

@@ -1,8 +1,8 @@
 """What this drive shows: the constants of the model, and every effect of the catalogue that needs no search.
 
-Where the log can be aligned, one pass carries the filter's sensitivity to every candidate (see sccal.filter.scoring)
-at typical noise; its information, with small amounts of everything else allowed, gives the standard deviation that an
-estimate would have. Where it cannot, the shape of the drive has to answer.
+Where the log can be aligned, one pass with every candidate free at typical noise gathers the information about all of
+them, which, with small amounts of everything else allowed, gives the standard deviation that an estimate would have.
+Where it cannot, the shape of the drive has to answer.
 """
 
 from __future__ import annotations
@@ -14,16 +14,15 @@ import numpy as np
 
 from sccal.align import Aligned, build_timeline
 from sccal.arrays import Floats, Ints
-from sccal.calibration.extension import Free, view_run
 from sccal.calibration.status import OFFSET_UNOBSERVED_RAD, UNOBSERVED_RATIO
 from sccal.calibration.unseen import STANDS_OUT
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
-from sccal.filter.columns import Placed, kernel_columns
-from sccal.filter.forward import Noise
-from sccal.filter.iterate import At, RunProblem, reported_covariance
+from sccal.evidence.candidates import plain_forms
+from sccal.evidence.extension import Free, FreeEffects
+from sccal.filter.iterate import RunProblem
+from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
-from sccal.filter.scoring import score
 from sccal.filter.start import coarse_constants, find_start
 from sccal.inspect.result import DriveFacts, Excited, Shown
 
@@ -42,8 +41,6 @@ WEAK_SHARE = 0.25
 SAME = 0.98
 """Canonical correlation from which on two effects are one."""
 NUISANCE = 0.5
-NOT_ASKED = ("missed_left", "missed_right")
-"""Radii by another name: never shown."""
 CORE = {
     "radii": ("wheel radii", "drive straights of 20 m and more, with fixes"),
     "track": ("track", "turn both ways: arcs, or spins in place"),
@@ -67,23 +64,21 @@ def excited_by_pass(aligned: Aligned) -> tuple[Excited, ...]:
     timeline = build_timeline(
         aligned, 0.01, HEADING_RATE_HZ / slower, FIX_RATE_HZ / slower, wheel_rate_hz=_wheel_rate_hz(aligned) / slower
     )
-    problem = RunProblem(aligned, timeline, start, typical_noise(aligned), FilterOptions(gate_sigmas=NEVER_GATE))
-    at = At(coarse_constants(aligned, start), np.zeros(0))
-    clear = problem.clear_steps(at.constants)
-    run = problem.begun(at, True, clear)
-    asked = [one for one in CATALOGUE.values() if Free(one).parameters and not _searched(one)]
-    view = view_run(problem, at, clear)
-    placed: list[Placed] = []
-    count = 0
-    for effect in asked:
-        parameters = Free(effect).parameters
-        placed += Free(effect).placed(view, [0.0] * len(parameters), count)
-        count += len(parameters)
-    block = np.zeros(timeline.t_s.size, dtype=np.int32)
-    columns = kernel_columns(placed, timeline)
-    found = score(run.events, run.columns, columns, count, run.model, run.x, run.P, block)
-    covariance = reported_covariance(run.finish())
-    return (*_constants(covariance, problem), *_effects(asked, found.information[0]))
+    asked = plain_forms()
+    problem = RunProblem(
+        aligned,
+        timeline,
+        start,
+        typical_noise(aligned),
+        FilterOptions(gate_sigmas=NEVER_GATE),
+        FreeEffects(tuple(asked)),
+    )
+    at = problem.at_centre(coarse_constants(aligned, start))
+    run = problem.begun(at, True, with_sigmas=False)
+    found = run.finish()
+    prior = np.array([one.prior_sigma for free in asked for one in free.parameters])
+    information = np.linalg.inv(run.belief.params / np.outer(prior, prior)) - np.eye(prior.size)
+    return (*_constants(found.final_covariance, problem), *_effects([one.effect for one in asked], information))
 
 
 def _wheel_rate_hz(aligned: Aligned) -> float:
@@ -93,12 +88,15 @@ def _wheel_rate_hz(aligned: Aligned) -> float:
     return float(np.clip(STEPS_PER_TURN * fast, WHEEL_RATE_HZ, FASTEST_HZ))
 
 
-def _searched(effect: Effect) -> bool:
-    return effect.name in NOT_ASKED or any(one.shape for one in effect.parameters)
-
-
 def _constants(covariance: Floats, problem: RunProblem) -> list[Excited]:
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    # Given that no effect is there: what the drive shows of the constants themselves.
+    constants = np.r_[3:7]
+    effects = np.arange(10, covariance.shape[0])
+    across = covariance[np.ix_(constants, effects)]
+    given = covariance[np.ix_(constants, constants)] - across @ np.linalg.solve(
+        covariance[np.ix_(effects, effects)], across.T
+    )
+    sigma = np.sqrt(np.maximum(np.diag(given), 0.0))
     prior = np.sqrt(np.diag(problem.prior))
     ratio = {
         "radii": float((sigma[:2] / prior[:2]).max()),
@@ -125,10 +123,10 @@ def _unit(name: str) -> str:
 
 
 def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
-    """information (K, K) about all parameters, in file units."""
+    """information (K, K) about all parameters, in units of their priors."""
     parameters = [one for effect in asked for one in Free(effect).parameters]
     prior = np.array([one.prior_sigma for one in parameters])
-    scaled = information * np.outer(prior, prior)
+    scaled = information
     small = NUISANCE * np.array([one.matters / one.prior_sigma if one.matters > 0 else 0.1 for one in parameters])
     bounds = np.cumsum([0, *(len(Free(effect).parameters) for effect in asked)])
     rows = {effect.name: np.arange(a, b) for effect, a, b in zip(asked, bounds[:-1], bounds[1:], strict=True)}

@@ -46,12 +46,23 @@ def advice_on(c: Calibration | VehicleCalibration, verdict: Verdict) -> Advice:
             f"{_deploy(usable)}; what was not estimated stays nominal there. "
             f"To get {others} too: {_reasons(rest) or 'drive straight, then turn both ways, and calibrate again.'}",
         )
+    if _lacks(c):
+        return Advice(
+            "doubtful",
+            "Doubtful: the constants make up for what the model lacks",
+            "The command sccal diagnose says what it is; its model.json then makes a calibration with it: "
+            "sccal calibrate … --model OUT/model.json.",
+        )
     return Advice(
         "doubtful",
         "Doubtful: find out why before these values are used",
         "Look into the reasons above and the figures of the residuals, mend the cause, and calibrate again. "
         "The command sccal diagnose looks for what the model lacks.",
     )
+
+
+def _lacks(c: Calibration | VehicleCalibration) -> bool:
+    return any(run.missing for run in c.runs) if isinstance(c, VehicleCalibration) else bool(c.missing)
 
 
 def _sorted(parameters: Parameters, with_offset: bool) -> tuple[list[Row], list[Row]]:

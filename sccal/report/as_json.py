@@ -21,6 +21,8 @@ from sccal.calibration.result import (
     Drive,
     Estimate,
     Fit,
+    HeldOut,
+    Missing,
     Noise,
     Outage,
     Parameters,
@@ -30,6 +32,7 @@ from sccal.calibration.result import (
 )
 from sccal.logs.streams import Notice
 from sccal.report.rows import parameter_rows
+from sccal.report.summary import missing_in_any
 from sccal.report.verdict import run_verdict, vehicle_verdict
 from sccal.results.saved import SCHEMA, VEHICLE_RUN
 
@@ -47,14 +50,16 @@ def calibration_json(c: Calibration) -> Json:
             "started": None if c.started_utc_s is None else utc_text(c.started_utc_s),
             "variant": variant_key(c.with_offset),
             "verdict": str(run_verdict(c)),
-            "parameters": _parameters(c.parameters),
+            "parameters": parameter_blocks(c.parameters),
             "effects": _effects(c.effects),
             "origin": {"lat_deg": c.origin_lat_deg, "lon_deg": c.origin_lon_deg, "alt_m": c.origin_alt_m},
             "fit": _fit(c.fit),
             "outage": _outage(c.outage),
+            "held_out": _held_out(c.held_out),
+            "missing": [_missing(one) for one in c.missing],
             "reference": _reference(c.against_reference),
             "unseen": [_unseen(one) for one in c.unseen],
-            "noise": _noise(c.noise),
+            "noise": noise_block(c.noise),
             "drive": _drive(c.drive),
             "clock": clock_block(c.clock),
             "notices": notice_blocks(c.notices),
@@ -73,13 +78,16 @@ def vehicle_json(v: VehicleCalibration) -> Json:
             "vehicle": v.vehicle.name,
             "variant": variant_key(v.with_offset),
             "verdict": str(vehicle_verdict(v)),
-            "parameters": _parameters(v.parameters),
+            "parameters": parameter_blocks(v.parameters),
             "effects": _effects(v.effects),
             "consistency_chi2_per_dof": v.consistency_chi2_per_dof,
             "fit": _fit(v.fit),
             "outage": _outage(v.outage),
+            "held_out": _held_out(v.held_out),
+            "missing": [_missing(one) for one in missing_in_any([c.missing for c in v.runs])],
             "runs": [
-                {"run": c.run, "verdict": str(run_verdict(c)), "parameters": _parameters(c.parameters)} for c in v.runs
+                {"run": c.run, "verdict": str(run_verdict(c)), "parameters": parameter_blocks(c.parameters)}
+                for c in v.runs
             ],
             "notices": notice_blocks(v.notices),
         }
@@ -111,15 +119,17 @@ def _provenance(provenance: Provenance | None) -> Json | None:
     }
 
 
-def _parameters(parameters: Parameters) -> Json:
-    return {row.key: _estimate(row.estimate) for row in parameter_rows(parameters)}
+def parameter_blocks(parameters: Parameters) -> Json:
+    """The four constants."""
+    return {row.key: estimate_block(row.estimate) for row in parameter_rows(parameters)}
 
 
 def _effects(effects: Mapping[str, Mapping[str, Estimate]]) -> Json:
-    return {effect: {name: _estimate(e) for name, e in named.items()} for effect, named in effects.items()}
+    return {effect: {name: estimate_block(e) for name, e in named.items()} for effect, named in effects.items()}
 
 
-def _estimate(estimate: Estimate) -> Json:
+def estimate_block(estimate: Estimate) -> Json:
+    """One parameter."""
     return {
         "value": estimate.value,
         "sigma": estimate.sigma,
@@ -165,6 +175,20 @@ def _outage(outage: Outage) -> Json:
     }
 
 
+def _held_out(held_out: HeldOut | None) -> Json | None:
+    if held_out is None:
+        return None
+    return {
+        "outage_rms_m": held_out.outage_rms_m,
+        "outage_end_rms_m": held_out.outage_end_rms_m,
+        "how": held_out.how,
+    }
+
+
+def _missing(one: Missing) -> Json:
+    return {"effect": one.effect, "title": one.title, "evidence_nats": one.evidence_nats, "size": one.size}
+
+
 def _reference(judged: AgainstReference | None) -> Json | None:
     if judged is None:
         return None
@@ -185,7 +209,8 @@ def _unseen(one: Unseen) -> Json:
     }
 
 
-def _noise(noise: Noise) -> Json:
+def noise_block(noise: Noise) -> Json:
+    """The levels of one run."""
     return {
         "heading_white_deg": math.degrees(noise.heading_white_rad),
         "heading_coloured_deg": math.degrees(noise.heading_coloured_rad),
@@ -195,6 +220,8 @@ def _noise(noise: Noise) -> Json:
         "fix_coloured_m": noise.fix_coloured_m,
         "fix_tau_s": noise.fix_tau_s,
         "slip_m_per_sqrt_m": noise.slip_m_per_sqrt_m,
+        "fix_stated_m": noise.fix_stated_m,
+        "apart_nats": noise.apart_nats,
         "source": noise.source,
     }
 

@@ -27,8 +27,10 @@ def compare_json(c: Comparison) -> Json:
                 {
                     "effect": one.effect,
                     "change": one.change,
-                    "held_out_gain_nats_a": one.nats_a,
-                    "held_out_gain_nats_b": one.nats_b,
+                    "evidence_nats_a": one.nats_a,
+                    "evidence_nats_b": one.nats_b,
+                    "held_out_gain_nats_a": one.held_out_a,
+                    "held_out_gain_nats_b": one.held_out_b,
                     "reason": one.reason,
                 }
                 for one in c.effects

@@ -64,9 +64,9 @@ def finding_drawings(d: Diagnosis, number: int) -> tuple[Drawing, ...]:
         drawings.append(
             Drawing(
                 f"candidates-{number + 1}",
-                "What each candidate, alone, gains on data that did not fit it. Blue is the one that was added, light "
-                "blue are other effects, grey are patterns without a name. The dashed line is what a finding needs, "
-                "at least, in this log.",
+                "The evidence for each candidate beside what was in the model already: the logarithm of the odds for "
+                "it, the price of its own freedom paid. Blue is the one that was added, light blue are others. The "
+                "dashed line is what a finding needs, at least.",
                 candidates(finding, d.placebo.needed_nats),
             )
         )
@@ -176,7 +176,7 @@ def candidates(finding: Finding, needed_nats: float) -> str:
     shown = list(finding.ranking[:RANKED_SHOWN])
     if not any(one.name == finding.name for one in shown):
         shown = [*shown[: RANKED_SHOWN - 1], *(one for one in finding.ranking if one.name == finding.name)]
-    gains = [one.held_out_gain_nats if math.isfinite(one.held_out_gain_nats) else 0.0 for one in shown]
+    gains = [one.evidence_nats if math.isfinite(one.evidence_nats) else 0.0 for one in shown]
     with styled("candidates"):
         height = 0.6 + 0.46 * len(shown)
         figure = Figure(figsize=(_NARROW_IN, height))
@@ -196,7 +196,7 @@ def candidates(finding: Finding, needed_nats: float) -> str:
             )  # fmt: skip
             end = max(gain, needed_nats if 0.0 < needed_nats < 0.1 * span and gain < needed_nats else 0.0)
             axes.annotate(
-                plain(one.held_out_gain_nats, 3 if abs(gain) >= 100.0 else 2), (end, place),
+                plain(one.evidence_nats, 3 if abs(gain) >= 100.0 else 2), (end, place),
                 (4, 0), textcoords="offset points", va="center", fontsize=8.0, zorder=4,
             )  # fmt: skip
         axes.set_xlim(min(*gains, 0.0) - 0.02 * span, max(*gains, 0.0) + 0.14 * span)
@@ -205,7 +205,7 @@ def candidates(finding: Finding, needed_nats: float) -> str:
         axes.spines["left"].set_visible(False)
         axes.grid(axis="y", visible=False)
         axes.xaxis.set_major_locator(MaxNLocator(6))
-        axes.set_xlabel("gain on held-out data (nats)")
+        axes.set_xlabel("evidence (nats)")
         full_tick_labels(axes)
         return svg_text(figure)
 

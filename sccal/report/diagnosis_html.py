@@ -15,7 +15,7 @@ from sccal.report.diagnosis_text import (
     doubt_sentence,
     finding_rows,
     judgement_rows,
-    patterns_sentence,
+    next_line,
     placebo_sentence,
     smallest_text,
     something_added,
@@ -28,6 +28,7 @@ from sccal.report.html import page
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.summary import warnings_first
 from sccal.report.text import sentence, shortened
+from sccal.results.model import MODEL_FILE
 from sccal.results.numbers import one_line, plain, short
 
 RUNS_LISTED = 6
@@ -83,7 +84,6 @@ def diagnosis_html(d: Diagnosis) -> str:
         alternatives=[_alternative(d, finding) for finding in d.findings if finding.indistinguishable_from],
         unexplained=sentence(unexplained_sentence(d.unexplained)),
         unexplained_drawing=unexplained_drawing(d.unexplained),
-        patterns=sentence(patterns_sentence(d)),
         not_excited=[Named(one.name, one.title, sentence(one.advice)) for one in d.not_excited],
         inseparable=[(one.names, sentence(one.advice)) for one in d.inseparable],
         detectable=[Named(one.name, one.title, smallest_text(one)) for one in d.detectable],
@@ -91,6 +91,7 @@ def diagnosis_html(d: Diagnosis) -> str:
         taken_back=[Named(name, title_of(name, d), sentence(why)) for name, why in d.taken_back.items()],
         noises=[_noise_cells(one) for one in d.noises],
         notices=warnings_first(d.notices),
+        next_line=next_line(d, (), f"OUT/{MODEL_FILE}").removeprefix("next: "),
         version=__version__,
     )
 
@@ -107,7 +108,7 @@ def _headline(d: Diagnosis) -> Headline:
         else:
             clauses.append(sentence(brings_clause(d)))
         return Headline(level, (*clauses, *doubts, *(left if d.unexplained.significant else [])))
-    if d.unexplained.significant or d.patterns:
+    if d.unexplained.significant:
         return Headline("left without a name", (sentence(verdict_sentence(d)),))
     return Headline("nothing found", (sentence(verdict_sentence(d)),))
 
@@ -128,7 +129,6 @@ def _step(d: Diagnosis, number: int) -> Step:
 
 
 def _evidence(d: Diagnosis, finding: Finding) -> tuple[tuple[str, str], ...]:
-    gain = finding.held_out_gain_nats
     drift = ""
     if finding.drift_before_m is not None and finding.drift_after_m is not None:
         drift = (
@@ -136,7 +136,8 @@ def _evidence(d: Diagnosis, finding: Finding) -> tuple[tuple[str, str], ...]:
             f"rms after {short(d.after.window_s)} s without fixes, held out"
         )
     return (
-        ("gain on held-out data", f"{plain(gain, 3)} nats (needed: {plain(d.placebo.needed_nats, 2)})"),
+        ("evidence", f"{plain(finding.evidence_nats, 3)} nats (needed: {plain(d.placebo.needed_nats, 2)})"),
+        ("gain on held-out data", f"{plain(finding.held_out_gain_nats, 3)} nats"),
         ("size", f"{plain(finding.t, 2)} times its standard deviation"),
         ("drift with this step", drift),
         ("could as well be", ", ".join(title_of(name, d) for name in finding.indistinguishable_from)),

@@ -10,7 +10,14 @@ from typing import Any
 
 from sccal import __version__
 from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
-from sccal.report.as_json import Json, _estimate, _noise, _parameters, notice_blocks, strict_document
+from sccal.report.as_json import (
+    Json,
+    estimate_block,
+    noise_block,
+    notice_blocks,
+    parameter_blocks,
+    strict_document,
+)
 
 SCHEMA = "sccal.diagnosis/1"
 
@@ -25,7 +32,6 @@ def diagnosis_json(d: Diagnosis) -> Json:
             "runs": d.runs,
             "trust": d.trust,
             "findings": [_finding(finding) for finding in d.findings],
-            "patterns": d.patterns,
             "taken_back": d.taken_back,
             "not_excited": [{"effect": one.name, "title": one.title, "advice": one.advice} for one in d.not_excited],
             "detectable": [
@@ -43,9 +49,9 @@ def diagnosis_json(d: Diagnosis) -> Json:
                 "highest_nats": d.placebo.highest_nats,
                 "needed_nats": d.placebo.needed_nats,
             },
-            "parameters_before": _parameters(d.parameters_before),
-            "parameters_after": _parameters(d.parameters_after),
-            "noise": [{"run": one.run, **_noise(one.noise)} for one in d.noises],
+            "parameters_before": parameter_blocks(d.parameters_before),
+            "parameters_after": parameter_blocks(d.parameters_after),
+            "noise": [{"run": one.run, **noise_block(one.noise)} for one in d.noises],
             "notices": notice_blocks(d.notices),
         }
     )
@@ -57,12 +63,16 @@ def _finding(finding: Finding) -> Json:
         "title": finding.title,
         "reference": finding.reference,
         "parameters": {
-            name: {**_estimate(estimate), "unit": finding.units.get(name, "")}
+            name: {**estimate_block(estimate), "unit": finding.units.get(name, "")}
             for name, estimate in finding.parameters.items()
         },
-        "evidence": {"held_out_gain_nats": finding.held_out_gain_nats, "t": finding.t},
+        "evidence": {
+            "evidence_nats": finding.evidence_nats,
+            "held_out_gain_nats": finding.held_out_gain_nats,
+            "t": finding.t,
+        },
         "indistinguishable_from": finding.indistinguishable_from,
-        "per_run": {name: [_estimate(one) for one in each] for name, each in finding.per_run.items()},
+        "per_run": {name: [estimate_block(one) for one in each] for name, each in finding.per_run.items()},
         "advice": finding.advice,
         "drift_before_m": finding.drift_before_m,
         "drift_after_m": finding.drift_after_m,
@@ -76,7 +86,7 @@ def _ranked(one: Ranked) -> Json:
         "effect": one.name,
         "title": one.title,
         "named": one.named,
-        "held_out_gain_nats": one.held_out_gain_nats,
+        "evidence_nats": one.evidence_nats,
         "t": one.t,
         "size": one.size,
     }
@@ -103,7 +113,7 @@ def _unexplained(left: Unexplained) -> Json:
         "port": left.port if there else None,
         "depends_on": left.depends_on if there else None,
         "variance_fraction": left.variance_fraction if there else 0,
-        "held_out_gain_nats": left.held_out_gain_nats if there else 0,
+        "evidence_nats": left.evidence_nats if there else 0,
         "t": left.t if there else 0,
         "size": left.size if there else None,
         "picture": _picture(left.picture) if there else None,

@@ -6,12 +6,14 @@ One sentence says what the machine does and what knowing it brings; then the num
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Callable, Iterable, Sequence
 
 from sccal.calibration.result import Estimate
 from sccal.diagnose.result import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
 from sccal.effects.catalogue import CATALOGUE
 from sccal.report.rows import Row
+from sccal.report.summary import held_out_drift
 from sccal.report.text import in_columns, labelled, notice_lines, shortened, wrapped
 from sccal.results.numbers import MISSING, one_line, plain, short, value_and_sigma
 
@@ -53,7 +55,7 @@ def diagnosis_text(d: Diagnosis, width: int = 100) -> str:
         lines += labelled("found if", [detectable_line(d.detectable)], width)
     lines += [
         *labelled("or else", [line for f in d.findings if (line := doubt_sentence(f))], width),
-        *labelled("left", [unexplained_sentence(d.unexplained), patterns_sentence(d)], width),
+        *labelled("left", [unexplained_sentence(d.unexplained)], width),
         *labelled("alike", _cut(inseparable_lines(d), INSEPARABLE_SHOWN), width),
         *labelled("unseen", _cut(unseen_lines(d), ADVICE_SHOWN), width),
         *labelled("back", [f"{name} was taken back: {why}" for name, why in d.taken_back.items()], width),
@@ -68,10 +70,8 @@ def verdict_sentence(d: Diagnosis) -> str:
     """What an engineer can act on, and what it brings, in one sentence."""
     if d.findings:
         return f"{_and([cause_clause(f) for f in d.findings], d)}: {brings_clause(d)}{_rivals(d.findings)}"
-    if d.unexplained.significant or d.patterns:
-        return "no effect with a name was found, but something is there: " + (
-            unexplained_sentence(d.unexplained) if d.unexplained.significant else patterns_sentence(d)
-        )
+    if d.unexplained.significant:
+        return f"no effect with a name was found, but something is there: {unexplained_sentence(d.unexplained)}"
     return (
         f"nothing that the model lacks was found: {judged_by(d)}, no effect explains more than chance does; "
         f"{_drift_now(d.before)}"
@@ -91,8 +91,6 @@ def cause_clause(finding: Finding) -> str:
 def brings_clause(d: Diagnosis) -> str:
     """What the findings bring where nothing was fitted."""
     with_it = {1: "it", 2: "both"}.get(len(d.findings), "all of them")
-    if d.patterns:
-        with_it += f" and {_count(len(d.patterns), 'pattern')} without a name"
     return f"with {with_it} {change_clause(d.before, d.after)}, {judged_by(d)}"
 
 
@@ -127,17 +125,10 @@ def unexplained_sentence(left: Unexplained) -> str:
     facts = [
         left.size,
         f"{plain(100.0 * left.variance_fraction, 2)} % of its variance",
-        f"{_nats(left.held_out_gain_nats)} held out",
+        f"evidence {_nats(left.evidence_nats)}",
         f"t {plain(left.t, 2)}",
     ]
     return one_line(f"the error of {port} follows {left.depends_on} ({', '.join(fact for fact in facts if fact)})")
-
-
-def patterns_sentence(d: Diagnosis) -> str:
-    """Patterns that were added without a name; empty where there are none."""
-    if not d.patterns:
-        return ""
-    return f"added to the model without a name: {'; '.join(one_line(one) for one in d.patterns)}"
 
 
 def inseparable_lines(d: Diagnosis) -> list[str]:
@@ -177,8 +168,8 @@ def placebo_sentence(d: Diagnosis) -> str:
         return "no nonsense column was tried, so how often chance passes is not known"
     passed = "none" if not d.placebo.passed else str(d.placebo.passed)
     return (
-        f"{passed} of {_count(d.placebo.tried, 'nonsense column')} passed the same test; the best gained "
-        f"{_nats(d.placebo.highest_nats)}, a finding needed {_nats(d.placebo.needed_nats)}"
+        f"{passed} of {_count(d.placebo.tried, 'nonsense column')} passed the same test; the best has evidence of "
+        f"{_nats(d.placebo.highest_nats)}, a finding needs {_nats(d.placebo.needed_nats)}"
     )
 
 
@@ -206,12 +197,22 @@ def runs_line(d: Diagnosis) -> str:
     return f"{one_line(d.vehicle.name)}, {_count(len(d.runs), 'run')} ({', '.join(names)}{more})"
 
 
+def next_line(d: Diagnosis, runs: Sequence[str], model: str) -> str:
+    """The command that makes a calibration of what was found; dots where the runs are not given."""
+    where = shlex.join(runs) if runs else "…"
+    if not d.model.effects:
+        return f"next: sccal calibrate {where} (the model lacks nothing that these data show)"
+    small = sum(not one.told for one in d.model.effects)
+    held = f" (the model holds {_count(small, 'effect')} too small to be told above)" if small else ""
+    return f"next: sccal calibrate {where} --model {shlex.quote(model)}{held}"
+
+
 def judgement_rows(d: Diagnosis) -> list[tuple[str, str, str, str]]:
     """What is judged, its unit, before and after."""
     b, a = d.before, d.after
     heading_deg = [math.degrees(one.heading_innovation_rms_rad) for one in (b, a)]
     return [
-        (f"drift after {short(a.window_s)} s without fixes", "m rms", _end_drift(b), _end_drift(a)),
+        (held_out_drift(a.window_s), "m rms", _end_drift(b), _end_drift(a)),
         ("drift on the way there", "m rms", _or_dash(b.outage_rms_m), _or_dash(a.outage_rms_m)),
         ("innovation of the fixes", "m rms", plain(b.gnss_innovation_rms_m), plain(a.gnss_innovation_rms_m)),
         ("innovation of the heading", "deg rms", plain(heading_deg[0]), plain(heading_deg[1])),
@@ -221,7 +222,7 @@ def judgement_rows(d: Diagnosis) -> list[tuple[str, str, str, str]]:
 
 def something_added(d: Diagnosis) -> bool:
     """False where before and after are the same model."""
-    return bool(d.findings or d.patterns)
+    return bool(d.findings or d.model.effects)
 
 
 def finding_rows(finding: Finding) -> tuple[Row, ...]:
@@ -242,7 +243,7 @@ def title_of(name: str, d: Diagnosis) -> str:
 
 
 def _findings_table(findings: Sequence[Finding], width: int) -> list[str]:
-    table = [("effect", "parameter", "value", "", "unit", "nats held out", "t")]
+    table = [("effect", "parameter", "value", "", "unit", "nats", "t")]
     reasons = []
     for finding in findings:
         for k, row in enumerate(finding_rows(finding)):
@@ -254,7 +255,7 @@ def _findings_table(findings: Sequence[Finding], width: int) -> list[str]:
                     row.value,
                     f"± {row.sigma}" if row.sigma not in ("", MISSING) else "",
                     row.unit,
-                    plain(finding.held_out_gain_nats, 3) if first else "",
+                    plain(finding.evidence_nats, 3) if first else "",
                     plain(finding.t, 2) if first else "",
                 )
             )
@@ -476,20 +477,41 @@ def _drive_slip(rate: Estimate) -> str:
     return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s² of speeding up"
 
 
+@_says("speed_offset", "mps")
+def _speed_offset(offset: Estimate) -> str:
+    return f"the wheels read {_size(offset)} m/s too {'fast' if offset.value > 0.0 else 'slow'} while the robot moves"
+
+
+@_says("heading_scale", "ratio")
+def _heading_scale(ratio: Estimate) -> str:
+    return f"the AHRS reading turns {_percent(ratio)} {'further' if ratio.value > 0.0 else 'less'} than the robot"
+
+
+@_says("antenna_height", "m")
+def _antenna_height(height: Estimate) -> str:
+    where = "above" if height.value > 0.0 else "below"
+    return f"the antenna stands {_size(height)} m {where} the ground, and swings out where the robot pitches and rolls"
+
+
 @_says("side_slip", "s")
 def _side_slip(time: Estimate) -> str:
     way = "outwards" if time.value > 0.0 else "inwards"
     return f"the robot slides {way} in turns, at {_size(time)} m/s for each m/s² of sideways acceleration"
 
 
-@_says("missed_left", "ratio")
-def _missed_left(ratio: Estimate) -> str:
-    return f"the left wheel's counter {'loses' if ratio.value > 0.0 else 'adds'} {_percent(ratio)} of its counts"
+@_says("missed_left", "ratio above_radps")
+def _missed_left(ratio: Estimate, above: Estimate) -> str:
+    return f"the left wheel's counter {_missed(ratio, above)}"
 
 
-@_says("missed_right", "ratio")
-def _missed_right(ratio: Estimate) -> str:
-    return f"the right wheel's counter {'loses' if ratio.value > 0.0 else 'adds'} {_percent(ratio)} of its counts"
+@_says("missed_right", "ratio above_radps")
+def _missed_right(ratio: Estimate, above: Estimate) -> str:
+    return f"the right wheel's counter {_missed(ratio, above)}"
+
+
+def _missed(ratio: Estimate, above: Estimate) -> str:
+    fast = f" above {_size(above)} rad/s" if above.value > 0.0 else ""
+    return f"{'loses' if ratio.value > 0.0 else 'adds'} {_percent(ratio)} of its counts{fast}"
 
 
 @_says("local_field", "deg east_m north_m radius_m")

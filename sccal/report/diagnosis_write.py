@@ -8,12 +8,16 @@ from sccal.diagnose.result import Diagnosis
 from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.diagnosis_json import diagnosis_json
+from sccal.report.model_json import model_json
+from sccal.results.diagnosis import DIAGNOSIS_FILE
+from sccal.results.model import MODEL_FILE
 
 
 def write_diagnosis(d: Diagnosis, out: Path) -> None:
-    """``diagnosis.json`` first, which needs no matplotlib, then the page ``diagnosis.html``."""
+    """``diagnosis.json`` and ``model.json`` first, which need no matplotlib, then the page ``diagnosis.html``."""
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "diagnosis.json", json_text(diagnosis_json(d)))
+    write_text(out / DIAGNOSIS_FILE, json_text(diagnosis_json(d)))
+    write_text(out / MODEL_FILE, json_text(model_json(d.model)))
     from sccal.report.diagnosis_html import diagnosis_html
 
     write_text(out / "diagnosis.html", diagnosis_html(d))

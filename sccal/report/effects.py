@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 
+from sccal.effects.catalogue import assignment
 from sccal.effects.effect import Effect
 
 
@@ -21,7 +22,8 @@ def effect_text(effect: Effect, width: int = 100) -> str:
     """One effect in full."""
     lines = [f"{effect.name}: {effect.title}", ""]
     for one in effect.parameters:
-        kind = "searched for" if one.shape else f"prior ± {one.prior_sigma:g}"
+        own = "" if one.left_out is None else f", {one.left_out:g} where not told"
+        kind = f"searched for{own}" if one.shape else f"prior ± {one.prior_sigma:g}"
         bounds = f"{one.lower:g} … {one.upper:g}"
         lines.append(f"  {one.name:<12} {one.unit:<14} {kind}, {bounds}, one for each {one.scope}")
     lines.append("")
@@ -31,6 +33,5 @@ def effect_text(effect: Effect, width: int = 100) -> str:
         ("source", effect.reference),
     ):
         lines += textwrap.wrap(text, width, initial_indent=f"{label:<11}", subsequent_indent=" " * 11)
-    example = ",".join(one.name for one in effect.parameters)
-    lines += ["", f"put it into a simulated log: sccal simulate OUT --effect {effect.name}={example}"]
+    lines += ["", f"put it into a simulated log: sccal simulate OUT --effect {assignment(effect)}"]
     return "\n".join(lines) + "\n"

@@ -6,11 +6,13 @@ import math
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from sccal.calibration.result import Calibration, Fit, Manoeuvre, Outage, Provenance
+from sccal.calibration.result import Calibration, Fit, HeldOut, Manoeuvre, Outage, Provenance
 from sccal.report.rows import parameter_rows
 from sccal.report.summary import (
     fixes_line,
     headings_line,
+    held_out_line,
+    missing_line,
     outage_line,
     recoveries_line,
     reference_lines,
@@ -105,20 +107,22 @@ def origin_lines(provenance: Provenance) -> tuple[tuple[str, str], ...]:
 def fit_facts(c: Calibration) -> tuple[tuple[str, str], ...]:
     """Fit, drift and what these data would not show; nothing empty."""
     facts = (
-        *fit_and_outage(c.fit, c.outage),
+        *fit_and_outage(c.fit, c.outage, c.held_out),
+        ("lacks", missing_line(c.missing)),
         *(("judged", line) for line in reference_lines(c.against_reference)),
         ("unseen", unseen_line(c.unseen)),
     )
     return tuple((name, text) for name, text in facts if text)
 
 
-def fit_and_outage(fit: Fit, outage: Outage) -> tuple[tuple[str, str], ...]:
+def fit_and_outage(fit: Fit, outage: Outage, held_out: HeldOut | None) -> tuple[tuple[str, str], ...]:
     """Of a run or of several."""
     return (
         ("fixes", fixes_line(fit)),
         ("heading", headings_line(fit)),
         ("filter", recoveries_line(fit)),
-        ("outage", outage_line(outage)),
+        ("drift, held out", held_out_line(held_out, outage.window_s)),
+        ("drift on the way", outage_line(outage)),
         ("how", one_line(outage.how) if outage.windows else ""),
     )
 

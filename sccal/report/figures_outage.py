@@ -19,7 +19,7 @@ def outage_plan(outage: Outage) -> Plan:
     """Drift of every window."""
     return Plan(
         "outage",
-        "Drift without fixes",
+        "Drift by what was learnt so far",
         f"Left: how far dead reckoning strayed in each {short(outage.window_s)} s without fixes. Right: the drift at "
         f"the windows' ends, from the smallest to the largest. {one_line(outage.how).rstrip('.').capitalize()}.",
         250.0,

@@ -17,6 +17,8 @@ from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
     clock_line,
     drive_line,
+    missing_in_any,
+    missing_line,
     noise_facts,
     unseen_in_all,
     unseen_line,
@@ -87,7 +89,8 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
         drawings=vehicle_drawings(v),
         fit=(
             ("runs", agreement),
-            *fit_and_outage(v.fit, v.outage),
+            *fit_and_outage(v.fit, v.outage, v.held_out),
+            ("lacks", missing_line(missing_in_any([c.missing for c in v.runs]))),
             ("unseen", unseen_line(unseen_in_all([c.unseen for c in v.runs]))),
         ),
         notices=warnings_first(v.notices),

@@ -41,7 +41,7 @@ def append_step_summary(outcome: BatchOutcome, environment: Mapping[str, str]) -
 
 
 def step_summary(outcome: BatchOutcome) -> str:
-    """Markdown: what failed, every run, then the gates that were skipped."""
+    """Markdown: what failed, every run, what the model lacks in them, then the gates that were skipped."""
     lines = [f"### sccal: {_headline(outcome)}", ""]
     if outcome.failures:
         lines += _table(("no result", "why"), ((one.name, str(one.error)) for one in outcome.failures))
@@ -49,6 +49,7 @@ def step_summary(outcome: BatchOutcome) -> str:
     if outcome.runs:
         header = ("run", "verdict", "R_right mm", "R_left mm", "track mm", "offset deg", "drift %")
         lines += _table(header, (_row(saved) for saved in (*outcome.runs, *outcome.vehicles)))
+    lines += _lacking(outcome.runs)
     lines += _gates(outcome, "skipped")
     return "\n".join(lines) + "\n"
 
@@ -57,6 +58,13 @@ def _gates(outcome: BatchOutcome, which: Outcome) -> Iterator[str]:
     told = [gate for gate in outcome.gates if gate.outcome == which]
     if told:
         yield from _table((f"gate {which}", "of"), ((gate_line(one), whose(one)) for one in told))
+
+
+def _lacking(runs: Sequence[Saved]) -> Iterator[str]:
+    found = [(saved, saved.document.get("missing") or ()) for saved in runs]
+    rows = [(saved.run, ", ".join(f"{one['effect']}: {one['title']}" for one in some)) for saved, some in found if some]
+    if rows:
+        yield from _table(("run", "sccal diagnose would name"), rows)
 
 
 def cut(text: str, most_bytes: int) -> bytes:

@@ -5,11 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from sccal.calibration.result import AgainstReference, Clock, Drive, Fit, Noise, Outage, OutageWindow, Unseen
+from sccal.calibration.result import (
+    AgainstReference,
+    Clock,
+    Drive,
+    Fit,
+    HeldOut,
+    Missing,
+    Noise,
+    Outage,
+    OutageWindow,
+    Unseen,
+)
 from sccal.logs.streams import Notice
 from sccal.results.numbers import MISSING, duration, one_line, plain, short, value_and_sigma
 
 LOSSES_SHOWN = 5
+LEARNT = "drift by what was learnt so far"
+"""Of the forward filter: what the robot would have met on the way."""
+
+
+def held_out_drift(window_s: float) -> str:
+    """What calibrations and diagnoses call the drift that was judged by data which fitted neither."""
+    return f"drift after {short(window_s)} s without fixes, held out"
 
 
 def fixes_line(fit: Fit) -> str:
@@ -38,12 +56,38 @@ def outage_line(outage: Outage) -> str:
     window = short(outage.window_s)
     count = len(outage.windows)
     if outage.end_rms_m is None:
-        return f"drift without fixes: no window of {window} s fits into the data"
+        return f"{LEARNT}: no window of {window} s fits into the data"
     share = "" if outage.percent_of_distance is None else f" ({plain(outage.percent_of_distance, 2)} % of distance)"
     return (
-        f"drift after {window} s without fixes: {_measured(outage.end_rms_m, 'm', 2)} rms{share}, "
+        f"{LEARNT}: {_measured(outage.end_rms_m, 'm', 2)} rms after {window} s without fixes{share}, "
         f"{count} window{'' if count == 1 else 's'}"
     )
+
+
+def held_out_line(held_out: HeldOut | None, window_s: float) -> str:
+    """The same quantity as before and after of a diagnosis; empty where it was not judged."""
+    if held_out is None or held_out.outage_end_rms_m is None:
+        return ""
+    rms = _measured(held_out.outage_end_rms_m, "m", 3)
+    return one_line(f"{held_out_drift(window_s)}: {rms} rms ({held_out.how})")
+
+
+def missing_line(missing: Sequence[Missing]) -> str:
+    """What a quick look says that the model lacks; empty where it lacks nothing."""
+    parts = [
+        f"{one.effect} (evidence {plain(one.evidence_nats, 3)} nats, {plain(one.size, 2)} times the size that matters)"
+        for one in missing
+    ]
+    return one_line(f"by a quick look, {', '.join(parts)}; see `sccal diagnose`") if parts else ""
+
+
+def missing_in_any(runs: Iterable[Sequence[Missing]]) -> tuple[Missing, ...]:
+    """What the model lacks in some run, each by the run that shows it most; the strongest first."""
+    strongest: dict[str, Missing] = {}
+    for one in (one for run in runs for one in run):
+        if one.effect not in strongest or one.evidence_nats > strongest[one.effect].evidence_nats:
+            strongest[one.effect] = one
+    return tuple(sorted(strongest.values(), key=lambda one: -one.evidence_nats))
 
 
 def reference_lines(judged: AgainstReference | None) -> tuple[str, ...]:

@@ -10,10 +10,14 @@ from sccal.calibration.result import Calibration, Estimate, Noise, Parameters, S
 from sccal.logs.streams import Notice
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
+    LEARNT,
     clock_line,
     drive_line,
     fixes_line,
     headings_line,
+    held_out_line,
+    missing_in_any,
+    missing_line,
     noise_facts,
     notice_text,
     outage_line,
@@ -48,7 +52,8 @@ def run_text(c: Calibration, width: int = 100) -> str:
         *labelled("fixes", [fixes_line(c.fit)], width),
         *labelled("heading", [headings_line(c.fit)], width),
         *labelled("filter", [recoveries_line(c.fit)], width),
-        *labelled("outage", [outage_line(c.outage)], width),
+        *labelled("drift", [held_out_line(c.held_out, c.outage.window_s), outage_line(c.outage)], width),
+        *labelled("lacks", [missing_line(c.missing)], width),
         *labelled("judged", reference_lines(c.against_reference), width),
         *labelled("unseen", [unseen_line(c.unseen)], width),
         *labelled("noise", _noise(c.noise), width),
@@ -77,7 +82,8 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
         *labelled("fixes", [fixes_line(v.fit)], width),
         *labelled("heading", [headings_line(v.fit)], width),
         *labelled("filter", [recoveries_line(v.fit)], width),
-        *labelled("outage", [outage_line(v.outage)], width),
+        *labelled("drift", [held_out_line(v.held_out, v.outage.window_s), outage_line(v.outage)], width),
+        *labelled("lacks", [missing_line(missing_in_any([c.missing for c in v.runs]))], width),
         *labelled("judged", _judged_runs(v.runs), width),
         *labelled("unseen", [unseen_line(unseen_in_all([c.unseen for c in v.runs]))], width),
         *labelled("notices", notice_lines(notices, "the runs' calibration.json"), width),
@@ -127,8 +133,8 @@ def _run_table(runs: Sequence[Calibration], width: int) -> list[str]:
     lines = in_columns(list(zip(names, *columns, strict=True)), "<>>>>><"[: 1 + len(columns)])
     statuses = {row.estimate.status for c in runs for row in parameter_rows(c.parameters)}
     legend = [_MARKS_MEAN[mark] for status, mark in _MARKS.items() if mark and status in statuses]
-    if legend:
-        lines.append(", ".join(legend))
+    legend.append(f"drift m: {LEARNT.removeprefix('drift ')}")
+    lines.append(", ".join(legend))
     return [*lines, *_run_doubts(runs, width)]
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from sccal.calibration.result import Calibration, Estimate, Fit, Noise, Parameters, VehicleCalibration
+from sccal.calibration.result import Calibration, Estimate, Fit, Missing, Noise, Parameters, VehicleCalibration
 from sccal.calibration.status import fixes_wander, heading_wanders
 from sccal.report.rows import parameter_rows
+from sccal.report.summary import missing_in_any
 from sccal.results.numbers import short
 
 NIS_LOW = 0.3
@@ -19,6 +20,8 @@ REJECTED_MOST = 0.1
 """Share of measurements that may be rejected before the accepted ones stop being the rule."""
 CONSISTENCY_HIGH = 3.0
 """χ² per degree of freedom of the runs about the shared parameters."""
+MISSING_NAMED = 3
+"""Effects that the model lacks, in the words of a verdict; the others by their number."""
 
 Level = Literal["good", "partial", "doubtful"]
 
@@ -36,7 +39,11 @@ class Verdict:
 
 def run_verdict(calibration: Calibration) -> Verdict:
     """Of one run."""
-    doubts = [*(notice.doubt for notice in calibration.notices if notice.doubt), *_noise_doubts(calibration.noise)]
+    doubts = [
+        *_missing_doubts(calibration.missing),
+        *(notice.doubt for notice in calibration.notices if notice.doubt),
+        *_noise_doubts(calibration.noise),
+    ]
     return _verdict(calibration.parameters, calibration.fit, calibration.with_offset, doubts)
 
 
@@ -48,7 +55,8 @@ def vehicle_verdict(vehicle: VehicleCalibration) -> Verdict:
         if chi2 is not None and not chi2 <= CONSISTENCY_HIGH
         else ()
     )
-    return _verdict(vehicle.parameters, vehicle.fit, vehicle.with_offset, disagreement)
+    missing = _missing_doubts(missing_in_any([run.missing for run in vehicle.runs]))
+    return _verdict(vehicle.parameters, vehicle.fit, vehicle.with_offset, [*missing, *disagreement])
 
 
 def _verdict(parameters: Parameters, fit: Fit, with_offset: bool, further_doubts: Iterable[str]) -> Verdict:
@@ -101,6 +109,18 @@ def _fit_doubts(fit: Fit) -> list[str]:
         times = "once" if fit.recoveries == 1 else f"{fit.recoveries} times"
         doubts.append(f"measurements left the prediction for good {times}")
     return doubts
+
+
+def _missing_doubts(missing: Sequence[Missing]) -> list[str]:
+    """What the constants make up for because nothing else in the model can."""
+    if not missing:
+        return []
+    titles = [one.title for one in missing[:MISSING_NAMED]]
+    rest = len(missing) - len(titles)
+    more = [f"{rest} more effect{'' if rest == 1 else 's'}"] if rest else []
+    *first, last = [*titles, *more]
+    named = f"{', '.join(first)} and {last}" if first else last
+    return [f"`sccal diagnose` would name {named}"]
 
 
 def _noise_doubts(noise: Noise) -> list[str]:

@@ -20,6 +20,8 @@ class SavedFinding:
 
     effect: str
     parameters: Mapping[str, SavedEstimate]
+    evidence_nats: float | None
+    """None where the file is of a version that did not tell it."""
     held_out_gain_nats: float | None
     t: float | None
     indistinguishable_from: tuple[str, ...]
@@ -48,6 +50,7 @@ class SavedDiagnosis:
             str(one["effect"]): SavedFinding(
                 str(one["effect"]),
                 {name: read_estimate({"status": "estimated", **block}) for name, block in one["parameters"].items()},
+                one["evidence"].get("evidence_nats"),
                 one["evidence"].get("held_out_gain_nats"),
                 one["evidence"].get("t"),
                 tuple(str(name) for name in one.get("indistinguishable_from", ())),

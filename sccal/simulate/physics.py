@@ -47,7 +47,10 @@ class Physics:
         return reading_rad
 
     def tilt(self, state: State, pitch_rad: Floats, roll_rad: Floats) -> tuple[Floats, Floats]:
-        """Pitch (nose up) and roll (left side up) that the AHRS reads: a hill."""
+        """Pitch (nose up) and roll (left side up) of the ground below, level at first: a hill puts its own in place.
+
+        Effects that need the same hill each lay it out, so it must not be added to what is there.
+        """
         return pitch_rad, roll_rad
 
     def antenna(self, state: State, east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:

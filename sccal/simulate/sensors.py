@@ -153,11 +153,12 @@ def read_ahrs(
         return np.radians(gauss_markov(rng, t.size, step_s, sigma_deg, time_s))
 
     yaw = state.yaw_rad + math.radians(settings.heading_offset_deg)
-    pitch = lasting("pitch", settings.tilt_sigma_deg, _TILT_TIME_S)
-    roll = lasting("roll", settings.tilt_sigma_deg, _TILT_TIME_S)
+    pitch, roll = np.zeros(t.size), np.zeros(t.size)
     for effect in physics:
         yaw = effect.heading(state, yaw)
         pitch, roll = effect.tilt(state, pitch, roll)
+    pitch = pitch + lasting("pitch", settings.tilt_sigma_deg, _TILT_TIME_S)
+    roll = roll + lasting("roll", settings.tilt_sigma_deg, _TILT_TIME_S)
     white = random_stream(seed, "ahrs.white").standard_normal(t.size) * math.radians(settings.white_sigma_deg)
     yaw = yaw + lasting("drift", settings.drift_sigma_deg, settings.drift_time_s) + white
     return AhrsLog(

@@ -90,7 +90,7 @@ def streams() -> Callable[..., Run]:
 
 @pytest.fixture(scope="session")
 def aligned_by_hand() -> Callable[..., Aligned]:
-    """An aligned run of given wheel samples and measurement times; headings and fixes are zeros."""
+    """An aligned run of given wheel samples and measurement times; headings are zeros, fixes a row of places."""
 
     def of(
         wheel_t_s: np.ndarray,
@@ -116,7 +116,7 @@ def aligned_by_hand() -> Callable[..., Aligned]:
             pitch_rad=None,
             roll_rad=None,
             fix_t_s=fix_t_s,
-            fix_east_m=np.zeros(fixes),
+            fix_east_m=np.arange(fixes, dtype=float),
             fix_north_m=np.zeros(fixes),
             fix_quality=np.full(fixes, 4),
             fix_var_east_m2=np.full(fixes, 1e-4),

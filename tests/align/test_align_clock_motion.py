@@ -190,3 +190,24 @@ def test_the_offset_is_told_at_the_start_too(drive):
     clock, half_s = aligned.clock, 0.5 * float(np.ptp(run.fixes.utc_s))
     assert clock.offset_at_start_s == pytest.approx(clock.offset_s - 1e-6 * clock.skew_ppm * half_s, abs=1e-3)
     assert clock.offset_s - clock.offset_at_start_s > 0.01
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("offset_s", [0.0, 0.1, 40.0])
+def test_a_robot_that_parked_for_long_shows_its_clocks_as_well(simulate, streams, held, offset_s):
+    """Twenty minutes of a receiver that holds its position, or of its noise alone, must not outvote five of driving."""
+    run = streams(simulate(path="general", stand_first_s=1200.0, duration_s=1500.0, gnss={"white_sigma_m": 0.3}))
+    if held:
+        still = run.fixes.utc_s < run.fixes.utc_s[0] + 1199.0
+        lat, lon = (np.where(still, each[0], each) for each in (run.fixes.lat_deg, run.fixes.lon_deg))
+        run = replace(run, fixes=replace(run.fixes, lat_deg=lat, lon_deg=lon))
+    moved, true_s = off(run, offset_s)
+    aligned = align(moved)
+    assert not [notice.doubt for notice in aligned.notices if "do not move together" in notice.doubt]
+    if offset_s < 1.0:
+        assert aligned.clock.source == "utc"
+    else:
+        clock = aligned.clock
+        driving_s = 0.5 * float(np.ptp(run.fixes.utc_s))
+        there_s = clock.offset_s + 1e-6 * clock.skew_ppm * driving_s
+        assert there_s == pytest.approx(true_s, abs=0.3)

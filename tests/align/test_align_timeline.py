@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from sccal.align import align, build_timeline, clear_steps
@@ -54,7 +56,9 @@ def test_increments_add_up_to_the_whole_angle(aligned_by_hand, log):
 @given(logs())
 @settings(max_examples=60, deadline=None)
 def test_every_measurement_has_one_row_at_its_own_time(aligned_by_hand, log):
-    timeline = build_timeline(aligned_by_hand(**log), heading_rate_hz=np.inf, fix_rate_hz=np.inf)
+    aligned = aligned_by_hand(**log)
+    assume(not aligned.standing_s)
+    timeline = build_timeline(aligned, heading_rate_hz=np.inf, fix_rate_hz=np.inf)
     assert np.all(np.diff(timeline.t_s) > 0)
     assert (timeline.t_s[0], timeline.t_s[-1]) == (log["wheel_t_s"][0], log["wheel_t_s"][-1])
     assert np.isin(log["wheel_t_s"], timeline.t_s).all()
@@ -98,9 +102,9 @@ def test_loose_variance_stands_between_the_two_samples(aligned_by_hand):
 def test_a_part_holds_only_what_is_between_its_ends(aligned_by_hand, log, begin, end):
     whole_s = log["wheel_t_s"][-1] - log["wheel_t_s"][0]
     first, last = (float(log["wheel_t_s"][0] + share * whole_s) for share in (begin, end))
-    timeline = build_timeline(
-        aligned_by_hand(**log), heading_rate_hz=np.inf, fix_rate_hz=np.inf, between_s=(first, last)
-    )
+    aligned = aligned_by_hand(**log)
+    assume(not aligned.standing_s)
+    timeline = build_timeline(aligned, heading_rate_hz=np.inf, fix_rate_hz=np.inf, between_s=(first, last))
     assert (timeline.t_s[0], timeline.t_s[-1]) == (first, last)
     for index, t_s in ((timeline.heading_index, log["heading_t_s"]), (timeline.fix_index, log["fix_t_s"])):
         assert index.tolist() == np.flatnonzero((t_s >= first) & (t_s <= last)).tolist()
@@ -184,3 +188,15 @@ def test_clear_steps_of_a_part_do_not_see_the_rest(simulate, streams):
     timeline = build_timeline(aligned, between_s=(middle_s, aligned.span_s[1]))
     right, _ = clear_steps(aligned, timeline, 1.0)
     assert right.sum() == pytest.approx(timeline.right_rad.sum(), abs=0.3)
+
+
+@pytest.mark.parametrize(("speed_mps", "kept"), [(0.0, 1), (0.005, 1), (0.05, 40)])
+def test_a_place_that_repeats_while_the_robot_stays_there_counts_once(aligned_by_hand, speed_mps, kept):
+    """A pivot: the wheels turn, the middle between them rests, and a receiver may hold what it had."""
+    wheel_t_s, fix_t_s = np.arange(0.0, 10.0, 0.05), np.arange(3.0, 7.0, 0.1)
+    along, turning = speed_mps * wheel_t_s / RADIUS_M, 4.0 * wheel_t_s
+    aligned = aligned_by_hand(wheel_t_s, along + turning, along - turning, fix_t_s, fix_t_s)
+    held = replace(aligned, fix_east_m=np.zeros(fix_t_s.size))
+    assert aligned.standing_s == ()
+    assert build_timeline(held).fix_index.size == kept
+    assert build_timeline(aligned).fix_index.size == fix_t_s.size

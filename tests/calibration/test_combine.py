@@ -56,13 +56,15 @@ def test_the_same_run_twice_is_half_the_variance_and_the_same_value(folders):
 
 
 def test_one_run_is_its_own_vehicle(folders):
-    run, problem = calibrated(folders[0])
+    run, problem = calibrated(folders[0], noise=GIVEN)
     assert joined([(run, problem)]).parameters == run.parameters
 
 
 def test_offsets_belong_to_their_runs(tmp_path):
     pairs = [
-        calibrated(written(tmp_path / name, f"ahrs.heading_offset_deg={offset}", duration_s=150, seed=seed))
+        calibrated(
+            written(tmp_path / name, f"ahrs.heading_offset_deg={offset}", duration_s=150, seed=seed), noise=GIVEN
+        )
         for name, offset, seed in (("a", 12.5, 1), ("b", 137.0, 2))
     ]
     vehicle = joined(pairs)
@@ -73,7 +75,9 @@ def test_offsets_belong_to_their_runs(tmp_path):
 
 def test_offsets_on_both_sides_of_half_a_turn_are_neighbours(tmp_path):
     pairs = [
-        calibrated(written(tmp_path / name, f"ahrs.heading_offset_deg={offset}", duration_s=150, seed=seed))
+        calibrated(
+            written(tmp_path / name, f"ahrs.heading_offset_deg={offset}", duration_s=150, seed=seed), noise=GIVEN
+        )
         for name, offset, seed in (("a", 179.8, 1), ("b", -179.9, 2))
     ]
     offset = joined(pairs).parameters.heading_offset_rad
@@ -83,7 +87,7 @@ def test_offsets_on_both_sides_of_half_a_turn_are_neighbours(tmp_path):
 
 def test_runs_that_disagree_widen_the_sigmas_and_are_told(tmp_path):
     pairs = [
-        calibrated(written(tmp_path / name, f"vehicle.radius_right_m={radius}", duration_s=150, seed=seed))
+        calibrated(written(tmp_path / name, f"vehicle.radius_right_m={radius}", duration_s=150, seed=seed), noise=GIVEN)
         for name, radius, seed in (("a", 0.0808, 1), ("b", 0.0812, 2), ("c", 0.0806, 3))
     ]
     vehicle = joined(pairs)

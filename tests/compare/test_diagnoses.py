@@ -23,7 +23,7 @@ def finding(effect, rivals=(), nats=100.0, **parameters):
     return {
         "effect": effect,
         "parameters": {name: {"value": value, "sigma": sigma} for name, (value, sigma) in parameters.items()},
-        "evidence": {"held_out_gain_nats": nats, "t": 10.0},
+        "evidence": {"evidence_nats": nats, "held_out_gain_nats": 0.5 * nats, "t": 10.0},
         "indistinguishable_from": list(rivals),
     }
 
@@ -123,7 +123,9 @@ def test_text_and_json_tell_the_same():
     assert document["findings"][0] == {
         "effect": "lever_arm",
         "change": "lost",
-        "held_out_gain_nats_a": 100.0,
+        "evidence_nats_a": 100.0,
+        "evidence_nats_b": None,
+        "held_out_gain_nats_a": 50.0,
         "held_out_gain_nats_b": None,
         "reason": "",
     }

@@ -1,9 +1,9 @@
-"""Simulated logs for diagnoses, each made, fitted and diagnosed once however many tests ask for it."""
+"""Simulated logs and their diagnoses, each made once however many tests ask for it."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
@@ -12,27 +12,31 @@ import numpy as np
 from sccal.align import Aligned, align
 from sccal.arrays import Floats
 from sccal.calibration.options import CalibrationOptions
-from sccal.diagnose.confounded import linear_effects
+from sccal.diagnose.criteria import PRICE_NATS
 from sccal.diagnose.diagnose import diagnose
-from sccal.diagnose.loop import evidence_of
-from sccal.diagnose.model import Model, fine_regime, first_model
-from sccal.diagnose.pool import Pool
 from sccal.diagnose.result import Diagnosis
+from sccal.diagnose.shapes import best_forms
 from sccal.effects.catalogue import parse_effect
-from sccal.filter.options import FilterOptions
+from sccal.effects.effect import Effect
+from sccal.evidence.candidates import Candidates, gather_candidates
+from sccal.evidence.extension import Free
+from sccal.evidence.model import Accepted
+from sccal.evidence.saturated import Saturated, saturate
 from sccal.simulate.choose import settings_from
-from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.physics import Physics
-from sccal.simulate.run import simulate_run
 from sccal.simulate.world import State
-from tests.runs import read
+from tests.evidence.logs import HEADING_HZ, USUAL_S, aligned, bare, write_log
+from tests.runs import SMALL, read
 
-RATES = ("encoder.rate_hz=50", "ahrs.rate_hz=20", "gnss.outlier_fraction=0.01")
 HARMONIC_DEG = 3.0
 PER_AMPERE_DEG = 0.6
 KNOTS_S = np.arange(0.0, 1000.0, 4.0)
 CURRENT_A = 5.0 + np.random.default_rng(7).uniform(-4.0, 4.0, KNOTS_S.size)
 """A motor current that wanders without regard to the drive."""
+OPTIONS = CalibrationOptions(heading_rate_hz=HEADING_HZ, outage_window_s=15.0)
+"""Windows short enough that each stretch of a short log has several."""
+SLOW = ("encoder.rate_hz=10", "ahrs.rate_hz=5", "gnss.rate_hz=2")
+"""Streams of a long log."""
 
 
 class ThirdHarmonic(Physics):
@@ -49,76 +53,64 @@ class MotorField(Physics):
         return reading_rad + np.radians(PER_AMPERE_DEG) * np.interp(state.t_s, KNOTS_S, CURRENT_A)
 
 
-def logged(
-    folder: Path,
-    physics: Sequence[Physics],
-    path: str = "general",
-    duration_s: float = 320.0,
-    seed: int = 3,
-    settings: Sequence[str] = (),
-) -> Aligned:
-    """Simulate, write, read back and align."""
-    chosen = settings_from([f"drive.path={path}", f"drive.duration_s={duration_s}", *RATES, *settings], seed)
-    write_run(simulate_run(chosen, physics), folder)
-    write_vehicle_file(chosen, folder)
-    return align(read(folder))
+def write_current(folder: Path) -> None:
+    """The motor current beside the ticks."""
+    file = folder / "encoder.csv"
+    head, *rows = file.read_text().splitlines()
+    t_s = np.array([float(row.split(",")[0]) for row in rows])
+    current = np.interp(t_s - settings_from(list(SMALL), 0).clock.start_utc_s, KNOTS_S, CURRENT_A)
+    more = [f"{row},{value:.3f}" for row, value in zip(rows, current.tolist(), strict=True)]
+    file.write_text("\n".join([f"{head},motor_current_a", *more]) + "\n")
 
 
 @cache
-def aligned(
-    *texts: str, path: str = "general", duration_s: float = 320.0, seed: int = 3, settings: tuple[str, ...] = ()
-) -> Aligned:
-    """A log with effects as the command line writes them, and one outlier in a hundred fixes."""
-    effects = [parse_effect(text) for text in texts]
+def with_motor_field(*texts: str, column: bool = True) -> Aligned:
+    """A log whose compass the motors turn, with effects of the catalogue, and perhaps the current as a column."""
+    physics = [effect.physics(values) for effect, values in map(parse_effect, texts)]
     with tempfile.TemporaryDirectory() as folder:
-        physics = [effect.physics(values) for effect, values in effects]
-        return logged(Path(folder), physics, path, duration_s, seed, settings)
-
-
-@cache
-def with_physics(kind: Callable[[], Physics], column: bool = False) -> Aligned:
-    """A log with an effect that is not in the catalogue, and perhaps the motor current beside the ticks."""
-    with tempfile.TemporaryDirectory() as folder:
-        found = logged(Path(folder), [kind()])
+        write_log(Path(folder), [MotorField(), *physics])
         if column:
-            file = Path(folder) / "encoder.csv"
-            head, *rows = file.read_text().splitlines()
-            t_s = np.array([float(row.split(",")[0]) for row in rows])
-            start_s = settings_from(list(RATES), 0).clock.start_utc_s
-            current = np.interp(t_s - start_s, KNOTS_S, CURRENT_A)
-            more = [f"{row},{value:.3f}" for row, value in zip(rows, current.tolist(), strict=True)]
-            file.write_text("\n".join([f"{head},motor_current_a", *more]) + "\n")
-            found = align(read(Path(folder)))
-    return found
+            write_current(Path(folder))
+        return align(read(Path(folder)))
 
 
 @cache
-def diagnosis(*texts: str, path: str = "general") -> Diagnosis:
-    """The diagnosis of one log of the usual length."""
-    return diagnose([aligned(*texts, path=path)], CalibrationOptions())
+def with_third_harmonic() -> Aligned:
+    """A log with an error that has no name."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_log(Path(folder), [ThirdHarmonic()], duration_s=120.0)
+        return align(read(Path(folder)))
 
 
 @cache
-def diagnosis_with(kind: Callable[[], Physics], column: bool = False) -> Diagnosis:
-    """The diagnosis of a log with an effect that is not in the catalogue."""
-    return diagnose([with_physics(kind, column)], CalibrationOptions())
+def diagnosis(
+    *texts: str, path: str = "general", duration_s: float = USUAL_S, settings: tuple[str, ...] = ()
+) -> Diagnosis:
+    """Of one log with effects as the command line writes them."""
+    return diagnosis_of(aligned(*texts, path=path, duration_s=duration_s, settings=settings))
+
+
+_DIAGNOSES: dict[int, tuple[Aligned, Diagnosis]] = {}
+
+
+def diagnosis_of(log: Aligned) -> Diagnosis:
+    """Of any of the logs above."""
+    if id(log) not in _DIAGNOSES:
+        _DIAGNOSES[id(log)] = log, diagnose([log], OPTIONS)
+    return _DIAGNOSES[id(log)][1]
 
 
 @cache
-def bare(*texts: str, path: str = "general", duration_s: float = 320.0) -> Model:
-    """The paper's model alone, fitted."""
-    return first_model([aligned(*texts, path=path, duration_s=duration_s)], fine_regime(FilterOptions(), 10.0))
+def everything_free(path: str = "general") -> tuple[Saturated, Candidates]:
+    """What an effect-free log says of all candidates."""
+    model = bare(path=path)
+    candidates = gather_candidates([model.view(0)])
+    competing = best_forms(model, candidates, ())
+    return saturate(model, competing, dict.fromkeys((one.key for one in competing), PRICE_NATS)), candidates
 
 
-@cache
-def several() -> Model:
-    """Three runs of one vehicle, fitted together."""
-    runs = [aligned(duration_s=150.0, seed=seed) for seed in (1, 2, 3)]
-    return first_model(runs, fine_regime(FilterOptions(), 5.0))
-
-
-@cache
-def pooled(path: str = "general") -> Pool:
-    """What an effect-free log says of all effects with a name."""
-    effects = linear_effects()
-    return Pool(evidence_of(bare(path=path), effects), effects)
+def free_beside(path: str, effects: Sequence[Effect]) -> tuple[Saturated, Candidates]:
+    """The same for some effects only."""
+    free = tuple(Free(one) for one in effects)
+    prices = dict.fromkeys((one.key for one in free), PRICE_NATS)
+    return saturate(bare(path=path), [Accepted(one) for one in free], prices, None), Candidates(free)

@@ -86,6 +86,7 @@ def test_each_vehicle_gets_a_folder(tmp_path):
         document = json.loads((out / name / "diagnosis.json").read_text())
         assert (document["runs"], document["vehicle"]) == ([run], vehicle)
         assert (out / name / "diagnosis.html").is_file()
+        assert json.loads((out / name / "model.json").read_text())["vehicle"] == vehicle
         assert str(out / name / "diagnosis.html") in called.out
 
 

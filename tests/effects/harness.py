@@ -13,10 +13,11 @@ from sccal.align import Aligned, Clock, Timeline, build_timeline
 from sccal.arrays import Floats
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.view import Belief, DriveView, view_drive
-from sccal.filter import kernel
+from sccal.filter import kernel, layout
 from sccal.filter.columns import Placed, kernel_columns
-from sccal.filter.forward import Filter, Noise
+from sccal.filter.forward import Filter
 from sccal.filter.layout import BASE_STATES
+from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.geodesy import TangentPlane
@@ -126,23 +127,20 @@ def innovations(log: Injected, effect: str, held: Mapping[str, float]) -> tuple[
     raw = (log.timeline.right_rad, log.timeline.left_rad)
     run = Filter(log.aligned, log.timeline, NOISE, FilterOptions(gate_sigmas=30.0), constants, raw)
     placed = [Placed(names.index(column.parameter), column) for column in columns]
-    states = BASE_STATES + len(names)
-    x = np.zeros(states)
     first = log.simulated.motion.at(
         log.timeline.t_s[:1] - settings.clock.start_utc_s + settings.clock.host_epoch_offset_s
     )
+    x = np.zeros(BASE_STATES)
     x[:3] = first.east_m[0], first.north_m[0], first.yaw_rad[0]
     x[3:6] = constants.as_array()
     x[6] = np.radians(settings.ahrs.heading_offset_deg)
     shapes = {p.name for p in one.parameters if p.shape}
-    x[BASE_STATES:] = [0.0 if name in shapes else held[name] for name in names]
-    model = run.model._replace(walk=np.zeros(states))
+    values = np.array([0.0 if name in shapes else held[name] for name in names])
     kernel.forward(
         run.events,
         kernel_columns(placed, log.timeline),
-        model,
-        x,
-        np.zeros((states, states)),
+        run.model._replace(walk=np.zeros(BASE_STATES)),
+        certain(x, values),
         run.memory,
         0,
         log.timeline.t_s.size,
@@ -150,3 +148,9 @@ def innovations(log: Injected, effect: str, held: Mapping[str, float]) -> tuple[
         run.output,
     )
     return run.output.heading_nu, run.output.fix_nu
+
+
+def certain(x: Floats, values: Floats) -> layout.Belief:
+    """A belief that knows its core state (10,) and its parameters (m,) and learns nothing."""
+    n, m = x.size, values.size
+    return layout.Belief(x, values, np.zeros((n, n)), np.zeros((n, m)), np.zeros((m, m)))

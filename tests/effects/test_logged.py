@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sccal.align import Series
-from sccal.calibration.extension import FreeEffects
+from sccal.evidence.extension import FreeEffects
 from sccal.effects.logged import LoggedColumn, Range, logged_effects
 from sccal.errors import DataError, SccalError, UsageError
 from sccal.simulate.physics import Physics

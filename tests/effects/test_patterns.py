@@ -44,21 +44,30 @@ def test_columns_have_the_rows_of_their_port(name):
         assert np.ptp(one.values) > 0.0
 
 
-@pytest.mark.parametrize("name", sorted(set(BY_NAME) - {"antenna_forward with tilt"}))
+@each_pattern
 def test_each_parameter_has_one_column_at_the_port(name):
     found = columns(name)
     assert len(found) == len(BY_NAME[name].parameters)
     assert {one.port for one in found} == {BY_NAME[name].port}
 
 
-def test_a_high_antenna_goes_back_where_the_nose_goes_up():
-    """And to the right where the left side goes up, by as much per radian: one height."""
-    ahead, aside = columns("antenna_forward with tilt")
-    drive = view()
-    assert (ahead.port, aside.port) == ("antenna_forward", "antenna_left")
-    assert ahead.parameter == aside.parameter
-    assert ahead.values == pytest.approx(-np.sin(drive.at_fixes(drive.steps.pitch_rad)))
-    assert aside.values == pytest.approx(-np.sin(drive.at_fixes(drive.steps.roll_rad)))
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("heading with heading (third harmonic)", "heading"),
+        ("heading with side of the last turn", "turn_rate"),
+        ("antenna_left with turn rate", "turn_rate"),
+        ("turn with speed squared (pull to one side)", "speed"),
+        ("along with direction of travel", "speed"),
+        ("antenna_forward with acceleration", "acceleration"),
+        ("along with pitch", "pitch"),
+        ("turn with roll", "roll"),
+        ("turn with place", "east"),
+        ("north with time", "time"),
+    ],
+)
+def test_it_is_drawn_against_what_it_follows(name, cause):
+    assert BY_NAME[name].shown_against == cause
 
 
 @each_pattern

@@ -112,6 +112,24 @@ def test_ardupilot_leaves_alone_what_was_not_estimated(enu_robot, key, names, st
     assert key.split("/")[-1] in told
 
 
+@pytest.mark.parametrize(
+    ("age", "says", "set_ms"),
+    [
+        ({"value": 0.1234, "sigma": 0.02}, "age of the fixes 0.123 +/- 0.020 s", 123),
+        ({"value": 0.011, "sigma": 0.02}, "may as well be zero", None),
+        ({"value": 0.4, "sigma": 0.02}, "it holds 1 to 250 ms", None),
+        ({"value": -0.1, "sigma": 0.02}, "it holds 1 to 250 ms", None),
+        ({"value": 0.1, "sigma": 0.2, **UNSEEN}, "left as it is: not observed in this data: drive turns", None),
+    ],
+)
+def test_ardupilot_takes_an_age_of_the_fixes_that_is_sure(enu_robot, age, says, set_ms):
+    document = json.loads(json.dumps(enu_robot.exported.saved.document))
+    document["effects"]["gnss_latency"] = {"s": {"status": "estimated", "reason": "", "nominal": None, **age}}
+    text = write_ardupilot(Result(Saved(enu_robot.exported.saved.path, document)))
+    assert says in text
+    assert loaded(text).get("GPS1_DELAY_MS") == set_ms
+
+
 def test_robot_localization_makes_up_no_offset(enu_robot):
     result = altered(enu_robot.exported, "heading_offset_deg", **UNSEEN)
     text = write_robot_localization(result)

@@ -247,7 +247,7 @@ def test_a_vehicle_has_no_path(enu_robot):
     result = enu_robot.exported
     vehicle = Result(replace(result.saved, document=result.saved.document | {"run": "(vehicle)", "runs": []}))
     for write in (write_geojson, write_kml, write_gpx, write_tum):
-        with pytest.raises(UsageError, match="several runs together have no path"):
+        with pytest.raises(UsageError, match="runs together have no path"):
             write(vehicle)
 
 

@@ -16,8 +16,16 @@ def make(
     use_offset: bool = True,
     coloured: bool = True,
     gate: float = 1e9,
+    bent: bool = False,
+    soft: bool = False,
+    outliers: float = 0.0,
+    correlated: bool = False,
 ):
-    """(events, columns, model, x, P): everything that a pass over ``count`` events needs."""
+    """(events, columns, model, x, P): everything that a pass over ``count`` events needs.
+
+    ``outliers`` is the share of readings and fixes that are far off; ``correlated`` priors let every core state and
+    every parameter know something of each other.
+    """
     rng = np.random.default_rng(seed)
     t = np.cumsum(rng.uniform(0.005, 0.02, count))
     speed, turn = 7.0 + np.sin(0.2 * t), 3.0 * np.sin(0.31 * t)
@@ -35,6 +43,9 @@ def make(
         motion_param=np.arange(len(motion_ports), dtype=np.int32),
         heading=rng.normal(0.0, 1.0, (h, heading_columns)),
         heading_param=np.arange(len(motion_ports), len(motion_ports) + heading_columns, dtype=np.int32),
+        heading_known=rng.normal(0.0, 0.01, h) if bent else np.zeros(h),
+        heading_slope=rng.normal(0.0, 0.05, h) if bent else np.zeros(h),
+        heading_at=rng.normal(0.0, 0.1, h) if bent else np.zeros(h),
         fix=rng.normal(0.0, 1.0, (f, len(fix_ports))),
         fix_port=np.array(fix_ports, dtype=np.int32),
         fix_param=np.arange(len(motion_ports) + heading_columns, params, dtype=np.int32),
@@ -43,6 +54,7 @@ def make(
     theta = np.cumsum((right - left) * 0.08 / 0.7)
     step = 0.5 * (right + left) * 0.08
     east, north = np.cumsum(step * np.cos(theta)), np.cumsum(step * np.sin(theta))
+    far_heading, far_fix = rng.random(h) < outliers, rng.random(f) < outliers
     events = K.Events(
         t_s=t,
         right_rad=right,
@@ -53,15 +65,15 @@ def make(
         heading_row=heading_row,
         fix_row=fix_row,
         out_row=np.where(np.arange(count) % 10 == 0, np.arange(count) // 10, -1).astype(np.int32),
-        yaw_rad=theta[heading_row >= 0] + 0.3 + rng.normal(0.0, 0.01, h),
+        yaw_rad=theta[heading_row >= 0] + 0.3 + rng.normal(0.0, 0.01, h) + 0.1 * far_heading,
         yaw_var_rad2=rng.uniform(0.5e-4, 2e-4, h),
-        fix_east_m=east[fix_row >= 0] + rng.normal(0.0, 0.02, f),
+        fix_east_m=east[fix_row >= 0] + rng.normal(0.0, 0.02, f) + 0.25 * far_fix,
         fix_north_m=north[fix_row >= 0] + rng.normal(0.0, 0.02, f),
         fix_var_east_m2=rng.uniform(1e-4, 4e-4, f),
         fix_var_north_m2=rng.uniform(1e-4, 4e-4, f),
         fix_cov_m2=rng.uniform(-0.5e-4, 0.5e-4, f),
     )
-    walk = np.zeros(n)
+    walk = np.zeros(K.BASE_STATES)
     walk[3:7] = (1e-12, 1e-12, 1e-10, 1e-8)
     model = K.Model(
         slip2=1e-5,
@@ -75,7 +87,7 @@ def make(
         upper=np.array([0.16, 0.16, 3.0]),
         heading_gate=gate,
         fix_gate=gate,
-        soft_gate=False,
+        soft_gate=soft,
         recover_count=1e9,
         recover_s=1e9,
         use_offset=use_offset,
@@ -88,6 +100,10 @@ def make(
         + [model.heading_coloured_var, model.fix_coloured_var, model.fix_coloured_var]
         + [1e-2] * params
     )
+    if correlated:
+        sigma = np.sqrt(np.diag(P))
+        mixing = np.eye(n) + 0.3 * rng.normal(size=(n, n)) / np.sqrt(n)
+        P = np.outer(sigma, sigma) * (mixing @ mixing.T)
     return events, columns, model, x, P
 
 
@@ -105,6 +121,13 @@ def output(events: K.Events) -> K.Output:
         antenna=np.full((f, 2), np.nan),
         total=np.zeros(2),
     )
+
+
+def believed(x: np.ndarray, P: np.ndarray) -> K.Belief:
+    """The belief of a state (n,) and a covariance (n, n) that hold core state and parameters together."""
+    n = K.BASE_STATES
+    empty = np.zeros((n, x.size - n))
+    return K.Belief(x[:n].copy(), x[n:].copy(), P[:n, :n], empty, P[n:, n:]).begun(P)
 
 
 def memory(events: K.Events) -> np.ndarray:

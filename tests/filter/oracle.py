@@ -2,6 +2,8 @@
 
 It shares no line with the kernel. Motion and measurements are written once each, as functions of the state, and their
 Jacobians are taken from these functions (Squire and Trapp 1998), so a wrong derivative in the kernel cannot hide here.
+
+A measurement that counts only by its probability w of being no outlier has the variance R + S (1/w − 1).
 """
 
 from __future__ import annotations
@@ -11,6 +13,9 @@ import numpy as np
 from sccal.filter import layout as K
 
 BASE = K.BASE_STATES
+OUTLIERS = 0.01
+OUTLIER_DENSITY = {1: 1 / (2 * np.pi), 2: 1e-4}
+"""By the number of scalars: an outlying heading may be anything, an outlying fix anywhere in 100 m × 100 m."""
 
 
 def motion(x, right, left, row, columns):
@@ -35,7 +40,10 @@ def motion(x, right, left, row, columns):
 
 
 def heading_reading(x, row, columns, use_offset):
-    value = x[2] + x[7] + (x[6] if use_offset else 0.0)
+    value = x[2] + x[7] + (x[6] if use_offset else 0.0) + columns.heading_known[row]
+    beyond = x[2] - columns.heading_at[row]
+    turns = np.floor((np.real(beyond) + np.pi) / (2 * np.pi))
+    value = value + columns.heading_slope[row] * (beyond - 2 * np.pi * turns)
     for k, param in enumerate(columns.heading_param):
         value = value + x[BASE + param] * columns.heading[row, k]
     return np.array([value])
@@ -64,6 +72,25 @@ def jacobian(function, x, step=1e-30):
     return np.array(columns).T.astype(x.dtype)
 
 
+def weight_of(nu, S, nis):
+    """Probability that a measurement is no outlier."""
+    determinant = float(S[0, 0]) if S.shape[0] == 1 else float(S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0])
+    inlier = (1 - OUTLIERS) * np.exp(-nis / 2) / np.sqrt((2 * np.pi) ** nu.size * determinant)
+    outlier = OUTLIERS * OUTLIER_DENSITY[nu.size]
+    return inlier / (inlier + outlier), -np.log(inlier + outlier)
+
+
+def taken(x, P, nu, H, R, gate, soft):
+    """(x, P, accepted, negative log-likelihood) after one measurement, judged by a gate or weighed softly."""
+    moved, shrunk, S, nis = update(x, P, nu, H, R)
+    weight, nll = weight_of(nu, S, nis)
+    if not soft:
+        ok = nis <= gate
+        return (moved, shrunk, ok, nll) if ok else (x, P, ok, nll)
+    moved, shrunk, _, _ = update(x, P, nu, H, R + S * (1 / weight - 1))
+    return moved, shrunk, weight > 0.5, nll
+
+
 def update(x, P, nu, H, R):
     S = H @ P @ H.T + R
     if S.shape[0] == 1:
@@ -76,13 +103,12 @@ def update(x, P, nu, H, R):
 
 
 def run(events, columns, model, x, P, kind=np.float64):
-    """All events; (x, P, heading innovations, fix innovations, accepted headings, accepted fixes)."""
+    """All events; (x, P, heading innovations, fix innovations, accepted headings, accepted fixes, cost of both)."""
     x, P = x.astype(kind).copy(), P.astype(kind).copy()
-    n = x.size
-    nu_h, nu_f, ok_h, ok_f = [], [], [], []
+    nu_h, nu_f, ok_h, ok_f, cost = [], [], [], [], np.zeros(2)
     t_before = t_heading = t_fix = events.t_s[0]
     for i, t in enumerate(events.t_s):
-        P[np.arange(3, n), np.arange(3, n)] += model.walk[3:] * (t - t_before)
+        P[np.arange(3, 10), np.arange(3, 10)] += model.walk[3:] * (t - t_before)
         t_before = t
         right, left = kind(events.right_rad[i]), kind(events.left_rad[i])
         F = jacobian(lambda z, r=right, le=left, i=i: motion(z, r, le, i, columns), x)
@@ -106,11 +132,10 @@ def run(events, columns, model, x, P, kind=np.float64):
             nu = (nu + np.pi) % (2 * np.pi) - np.pi
             H = jacobian(reading, x)
             R = np.array([[kind(events.yaw_var_rad2[h])]])
-            moved, shrunk, _, nis = update(x, P, nu, H, R)
             nu_h.append(float(nu[0]))
-            ok_h.append(nis <= model.heading_gate)
-            if ok_h[-1]:
-                x, P = moved, shrunk
+            x, P, ok, nll = taken(x, P, nu, H, R, model.heading_gate, model.soft_gate)
+            ok_h.append(ok)
+            cost[0] += nll
 
         f = events.fix_row[i]
         if f >= 0:
@@ -126,12 +151,11 @@ def run(events, columns, model, x, P, kind=np.float64):
             nu = np.array([events.fix_east_m[f], events.fix_north_m[f]], dtype=kind) - position(x)
             cov = events.fix_cov_m2[f]
             R = np.array([[events.fix_var_east_m2[f], cov], [cov, events.fix_var_north_m2[f]]], dtype=kind)
-            moved, shrunk, _, nis = update(x, P, nu, jacobian(position, x), R)
             nu_f.append([float(v) for v in nu])
-            ok_f.append(nis <= model.fix_gate)
-            if ok_f[-1]:
-                x, P = moved, shrunk
-    return x, P, np.array(nu_h), np.array(nu_f).reshape(-1, 2), np.array(ok_h), np.array(ok_f)
+            x, P, ok, nll = taken(x, P, nu, jacobian(position, x), R, model.fix_gate, model.soft_gate)
+            ok_f.append(ok)
+            cost[1] += nll
+    return x, P, np.array(nu_h), np.array(nu_f).reshape(-1, 2), np.array(ok_h), np.array(ok_f), cost
 
 
 def decay(x, P, state, factor, stationary_var):

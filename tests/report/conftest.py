@@ -19,6 +19,7 @@ from sccal.calibration.result import (
     Estimate,
     Fit,
     Fixes,
+    HeldOut,
     History,
     Manoeuvre,
     Noise,
@@ -162,6 +163,7 @@ def run(
         causes=causes(rng),
         consistency=consistency(duration_s, rng),
         manoeuvres=MANOEUVRES,
+        held_out=HeldOut(0.0301, 0.0552, "each of 4 stretches of the run judged by a fit that saw nothing of it"),
         notices=(
             Notice("encoder.csv", "rows with text cells dropped", 3, "line 40"),
             Notice("gnss.nmea", "sentences with a wrong checksum dropped", 12, "line 1023", "warning"),
@@ -190,6 +192,7 @@ def ugly_run(name: str = "campaign-2024-06-01/very/deep/folder/with-a-name-that-
         ),
         fit=Fit(nan, math.radians(0.3), 7.3, 0.97, 30, 70, 400, 0, 3),
         outage=outage(0),
+        held_out=None,
         clock=Clock("host", 0.0, 0.0, nan, 2),
         notices=tuple(
             Notice(f"column_{k}.csv", "cells were empty", k + 1, f"line {k}", "warning" if k in (4, 8) else "info")
@@ -201,7 +204,15 @@ def ugly_run(name: str = "campaign-2024-06-01/very/deep/folder/with-a-name-that-
 def vehicle(*runs: Calibration) -> VehicleCalibration:
     notices = (Notice("run 3", "runs left out of the vehicle's fit, nothing observed", 1, "", "warning"),)
     return VehicleCalibration(
-        VEHICLE, True, tuple(runs), estimates(), runs[0].fit, outage(16), 1.21 if len(runs) > 1 else None, notices
+        VEHICLE,
+        True,
+        tuple(runs),
+        estimates(),
+        runs[0].fit,
+        outage(16),
+        1.21 if len(runs) > 1 else None,
+        notices,
+        held_out=HeldOut(0.0411, 0.0713, "each of 3 runs judged by constants fitted on the 2 others"),
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from sccal.calibration.result import Estimate, Noise, OutageWindow, Parameters
+from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.diagnose.result import (
     Detectable,
     Diagnosis,
@@ -34,7 +35,7 @@ from sccal.report.as_json import json_text
 from sccal.report.diagnosis_figures import candidates, drift_before_after, finding_drawings, residual_picture
 from sccal.report.diagnosis_html import diagnosis_html
 from sccal.report.diagnosis_json import diagnosis_json
-from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, verdict_sentence
+from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
 from sccal.report.diagnosis_write import write_diagnosis
 from tests.report.pages import assert_page
 
@@ -91,10 +92,10 @@ def picture(amplitude: float = 4.0, points: int = 24, seed: int = 5) -> Picture:
 def ranking(chosen: str) -> tuple[Ranked, ...]:
     others = (
         Ranked("gnss_latency", CATALOGUE["gnss_latency"].title, True, 57.2, 9.1, 3.0),
-        Ranked("antenna_left with turn rate", "antenna_left follows turn rate", False, 41.0, 8.2, 2.0),
+        Ranked("along~ambient_c", "ambient_c stretches the distance driven", True, 41.0, 8.2, 2.0),
         Ranked("side_slip", CATALOGUE["side_slip"].title, True, 18.0, 5.1, 1.2),
         Ranked("slope", CATALOGUE["slope"].title, True, 0.4, 0.9, 0.3),
-        Ranked("heading with time", "heading follows time", False, -2.3, 0.2, 0.1),
+        Ranked("heading~ambient_c", "ambient_c turns the AHRS reading", True, -2.3, 0.2, 0.1),
     )
     return (Ranked(chosen, CATALOGUE[chosen].title, True, 372.4, 24.3, 18.0), *others)
 
@@ -107,6 +108,7 @@ def lever_arm(forward: Estimate, left: Estimate) -> Finding:
         {"forward_m": forward, "left_m": left},
         {"forward_m": "m", "left_m": "m"},
         372.4,
+        310.2,
         24.3,
         ("gnss_latency",),
         "spin in place both ways, and drive the same line at two speeds",
@@ -131,6 +133,7 @@ def of(name: str, units: tuple[str, ...], *values: float, sigma: float = 0.004) 
         {key: Estimate(value, sigma, "estimated") for key, value in zip(names, values, strict=True)},
         dict(zip(names, units, strict=True)),
         61.0,
+        50.3,
         8.4,
         (),
         "",
@@ -155,12 +158,12 @@ def diagnosis(*findings: Finding) -> Diagnosis:
     )
     noise = Noise(math.radians(0.42), math.radians(0.8), 17.3, 1.12, 0.011, 120.0, 0.0021)
     runs = ("yard/figure-eight", "yard/square", "field/rows")
+    effects = tuple(SavedEffect(one.name, one.title, one.parameters, one.units) for one in findings)
     return Diagnosis(
         runs=runs,
         vehicle=Vehicle("tracked-demo", Path("logs/vehicle.toml"), 0.08, 0.70, ticks_per_rev=32768),
         trust="every sensor with the noise that its own residuals show, outliers at a tenth",
         findings=findings,
-        patterns=(),
         taken_back={"slope": "refitted it came out at 0.4 of the smallest size that matters, 0.9 of its sigma"},
         not_excited=(
             NotExcited("speed_slip", "wheels that slip more at higher speed", "drive at a second speed"),
@@ -183,6 +186,7 @@ def diagnosis(*findings: Finding) -> Diagnosis:
         parameters_after=replace(constants, track_m=replace(constants.track_m, value=0.70512)),
         noises=tuple(RunNoise(run, replace(noise, fix_scale=1.0 + 0.1 * k)) for k, run in enumerate(runs)),
         notices=(Notice("gnss.nmea", "sentences with a wrong checksum dropped", 12, "line 1023", "warning"),),
+        model=SavedModel("tracked-demo", constants, effects, dict.fromkeys(runs, noise), 0.86, "on the others"),
     )  # fmt: skip
 
 
@@ -193,7 +197,6 @@ NOTHING = replace(diagnosis(), after=judgement(1.37, seed=1))
 LEFT_OVER = replace(
     NOTHING,
     unexplained=Unexplained(True, "heading", "speed squared", 0.34, 41.2, 6.3, "up to 2.1 deg", picture(2.1)),
-    patterns=("antenna_forward with acceleration",),
 )
 WITHOUT_WINDOWS = replace(ONE, before=judgement(None), after=replace(judgement(None), gnss_innovation_rms_m=0.107))
 MANY_RUNS = replace(
@@ -253,11 +256,23 @@ def test_the_antenna_s_side_in_words(forward_m: float, left_m: float, says: str)
         ("gnss_latency", (0.12,), "the fixes show where the antenna was 0.12 s before their stamp"),
         ("gnss_latency", (-0.12,), "the fixes show where the antenna was 0.12 s after their stamp"),
         ("heading_latency", (0.12,), "the AHRS readings show the heading of 0.12 s before their stamp"),
-        ("hard_iron", (-3.0, 4.0), "magnetised parts near the compass turn it by up to 5.00 deg, once per full turn"),
-        ("soft_iron", (0.3, 0.4), "iron near the compass turns it by up to 0.50 deg, twice per full turn"),
+        (
+            "hard_iron",
+            (-3.0, 4.0, 0.0),
+            "magnetised parts near the compass turn it by up to 5.00 deg, once per full turn",
+        ),
+        ("soft_iron", (0.3, 0.4, 0.0), "iron near the compass turns it by up to 0.50 deg, twice per full turn"),
         ("heading_drift", (-12.3,), "the AHRS heading drifts by 12.3 deg an hour to the right (clockwise)"),
         ("radius_step", (-0.02, 312.0), "both wheels' radii shrink by 2.00 % 312 s after the run's start"),
-        ("missed_right", (0.02,), "the right wheel's counter loses 2.00 % of its counts"),
+        ("missed_right", (0.02, 9.0), "the right wheel's counter loses 2.00 % of its counts above 9.00 rad/s"),
+        ("missed_left", (0.02, 0.0), "the left wheel's counter loses 2.00 % of its counts"),
+        ("speed_offset", (0.041,), "the wheels read 0.041 m/s too fast while the robot moves"),
+        ("heading_scale", (-0.012,), "the AHRS reading turns 1.20 % less than the robot"),
+        (
+            "antenna_height",
+            (1.4,),
+            "the antenna stands 1.40 m above the ground, and swings out where the robot pitches and rolls",
+        ),
         ("slope", (1.2,), "level distance shorter than the travelled one on a slope (ratio 1.2000)"),
     ],
 )
@@ -340,7 +355,9 @@ def test_the_terminal_s_tables() -> None:
     assert ["lever_arm", "forward_m", "0.012", "±", "0.021", "m", "372", "24"] in rows
     assert ["left_m", "-0.742", "±", "0.013", "m"] in rows
     assert ["turn_slip", "per_radps", "0.1200", "±", "0.0040", "s/rad", "61.0", "8.4"] in rows
-    assert "drift after 30 s without fixes m rms 1.37 (1.1 … 1.7) 0.860 (0.69 … 1.1)" in [" ".join(r) for r in rows]
+    assert "drift after 30 s without fixes, held out m rms 1.37 (1.1 … 1.7) 0.860 (0.69 … 1.1)" in [
+        " ".join(r) for r in rows
+    ]
     assert ["innovation", "of", "the", "heading", "deg", "rms", "1.50", "1.50"] in rows
 
 
@@ -349,7 +366,10 @@ def test_what_limits_the_answer_is_said() -> None:
     assert "or else lever_arm could as well be gnss_latency; to tell: spin in place both ways" in text
     assert "unseen speed_slip, speed_field: drive at a second speed" in text
     assert "alike turn_scrub and side_slip: drive laps both ways at two speeds" in text
-    assert "1 of 60 nonsense columns passed the same test; the best gained 3.2 nats, a finding needed 6.4 nats" in text
+    assert (
+        "1 of 60 nonsense columns passed the same test; the best has evidence of 3.2 nats, a finding needs 6.4 nats"
+        in text
+    )
     assert "back slope was taken back: refitted it came out at 0.4" in text
     assert "fixes 1.0 … 1.2 x stated sigma" in text
     assert "found if" not in text
@@ -359,15 +379,15 @@ def test_nothing_found_says_what_would_have_been() -> None:
     text = unwrapped(diagnosis_text(NOTHING, 100))
     assert text.startswith("nothing that the model lacks was found")
     assert "found if lever_arm forward_m 0.030 m, left_m 0.020 m; gnss_latency 0.041 s; missed_left 0.0050" in text
-    assert "nats held out" not in text
+    assert "falls" not in text
+    assert " nats t" not in text
     assert "falls" not in text
 
 
 def test_something_without_a_name_is_never_called_nothing() -> None:
     text = unwrapped(diagnosis_text(LEFT_OVER, 100))
     assert text.startswith("no effect with a name was found, but something is there: the error of the heading readings")
-    assert "follows speed squared (up to 2.1 deg, 34 % of its variance, 41 nats held out, t 6.3)" in text
-    assert "added to the model without a name: antenna_forward with acceleration" in text
+    assert "follows speed squared (up to 2.1 deg, 34 % of its variance, evidence 41 nats, t 6.3)" in text
     assert "nothing that the model lacks" not in text
 
 
@@ -396,7 +416,7 @@ def test_the_json_s_keys_and_units() -> None:
     assert first["parameters"]["left_m"]["value"] == -0.742
     assert first["parameters"]["left_m"]["sigma"] == 0.013
     assert first["parameters"]["left_m"]["unit"] == "m"
-    assert first["evidence"] == {"held_out_gain_nats": 372.4, "t": 24.3}
+    assert first["evidence"] == {"evidence_nats": 372.4, "held_out_gain_nats": 310.2, "t": 24.3}
     assert first["indistinguishable_from"] == ["gnss_latency"]
     assert second["indistinguishable_from"] == []
     assert document["not_excited"][0]["effect"] == "speed_slip"
@@ -520,9 +540,21 @@ def test_figures_survive_holes() -> None:
     ElementTree.fromstring(candidates(replace(RIGHT, ranking=RIGHT.ranking[1:]), NAN))
 
 
-def test_both_files_are_written(tmp_path: Path) -> None:
+def test_all_files_are_written(tmp_path: Path) -> None:
     write_diagnosis(TWO, tmp_path / "new" / "out")
-    assert sorted(path.name for path in (tmp_path / "new" / "out").iterdir()) == ["diagnosis.html", "diagnosis.json"]
+    written = sorted(path.name for path in (tmp_path / "new" / "out").iterdir())
+    assert written == ["diagnosis.html", "diagnosis.json", "model.json"]
     document = json.loads((tmp_path / "new" / "out" / "diagnosis.json").read_text(encoding="utf-8"))
     assert document["findings"][0]["effect"] == "lever_arm"
-    assert 'href="diagnosis.json"' in (tmp_path / "new" / "out" / "diagnosis.html").read_text(encoding="utf-8")
+    page = (tmp_path / "new" / "out" / "diagnosis.html").read_text(encoding="utf-8")
+    assert 'href="diagnosis.json"' in page
+    assert 'href="model.json"' in page
+
+
+def test_the_next_command_is_told() -> None:
+    assert next_line(TWO, ["my runs"], "out/model.json") == "next: sccal calibrate 'my runs' --model out/model.json"
+    assert "sccal calibrate … --model OUT/model.json" in diagnosis_html(TWO)
+    assert next_line(NOTHING, ["runs"], "out/model.json").startswith("next: sccal calibrate runs (the model lacks")
+    small = replace(TWO.model.effects[1], told=False)
+    held = replace(TWO, model=replace(TWO.model, effects=(TWO.model.effects[0], small)))
+    assert "holds 1 effect too small to be told" in next_line(held, [], "out/model.json")

@@ -49,7 +49,7 @@ def test_a_run_s_page(a_run: Calibration) -> None:
     assert_page(html)
     assert html.count("<svg") == 6
     assert "0.080831 ± 0.000012 m" in html
-    assert "drift after 30 s without fixes: 0.12 m rms" in html
+    assert "drift by what was learnt so far: 0.12 m rms after 30 s without fixes" in html
 
 
 def test_an_ugly_run_s_page_gives_reasons_and_no_empty_figure(an_ugly_run: Calibration) -> None:

@@ -41,7 +41,7 @@ def test_one_line_per_run_with_marks_and_their_meaning(a_vehicle: VehicleCalibra
     assert [line.split()[0] for line in lines[3:5]] == ["yard/figure-eight", "yard/square"]
     assert "96.000 ±0.010!" in lines[5]
     assert "±n/a              ? " in lines[5]
-    assert lines[6] == "? not observed, ! at bound, = held"
+    assert lines[6] == "? not observed, ! at bound, = held, drift m: by what was learnt so far"
 
 
 def test_warnings_come_first_and_the_rest_is_counted(a_run: Calibration) -> None:

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from sccal.calibration.result import Calibration, Status, VehicleCalibration
+from sccal.calibration.result import Calibration, Missing, Status, VehicleCalibration
+from sccal.gates.result import BatchOutcome
+from sccal.report.as_json import calibration_json, vehicle_json
+from sccal.report.html import run_html
+from sccal.report.junit import junit_xml
+from sccal.report.step_summary import step_summary
+from sccal.report.text import run_text, vehicle_text
 from sccal.report.verdict import run_verdict, vehicle_verdict
+from sccal.results.saved import Saved
 
 
 def with_status(c: Calibration, status: Status, *names: str) -> Calibration:
@@ -27,6 +35,46 @@ def test_the_offset_counts_only_where_it_is_a_state(a_run: Calibration) -> None:
     held = with_status(a_run, "held", "heading_offset_rad")
     assert str(run_verdict(held)) == "partial: heading_offset_deg held"
     assert str(run_verdict(replace(held, with_offset=False))).startswith("good: all three parameters")
+
+
+ARM = Missing("lever_arm", "antenna off the middle between the wheels", 812.4, 8.0)
+SLIP = Missing("turn_slip", "tracks that skid sideways in turns, more in fast ones", 61.2, 1.4)
+
+
+def test_what_the_model_lacks_is_a_doubt(a_run: Calibration) -> None:
+    verdict = run_verdict(replace(a_run, missing=(ARM, SLIP)))
+    assert verdict.level == "doubtful"
+    assert verdict.because == (f"`sccal diagnose` would name {ARM.title} and {SLIP.title}",)
+    several = tuple(replace(ARM, effect=str(k), title=f"effect {k}") for k in range(5))
+    assert str(run_verdict(replace(a_run, missing=several))).endswith("effect 0, effect 1, effect 2 and 2 more effects")
+
+
+def test_what_one_run_shows_missing_is_the_vehicle_s_doubt(a_run: Calibration, a_vehicle: VehicleCalibration) -> None:
+    weaker = replace(ARM, evidence_nats=30.0)
+    runs = (replace(a_run, missing=(weaker,)), replace(a_run, missing=(SLIP, ARM)), a_run)
+    vehicle = replace(a_vehicle, runs=runs, consistency_chi2_per_dof=1.0)
+    assert vehicle_verdict(vehicle).because == (f"`sccal diagnose` would name {ARM.title} and {SLIP.title}",)
+    assert vehicle_json(vehicle)["missing"][0] == {
+        "effect": "lever_arm", "title": ARM.title, "evidence_nats": 812.4, "size": 8.0
+    }  # fmt: skip
+    text = " ".join(vehicle_text(vehicle, 100).split())
+    assert "lacks by a quick look, lever_arm (evidence 812 nats, 8.0 times the size that matters), turn_slip" in text
+
+
+def test_what_the_model_lacks_is_told_wherever_the_run_is(a_run: Calibration) -> None:
+    lacking = replace(a_run, missing=(ARM,))
+    assert calibration_json(lacking)["missing"] == [
+        {"effect": "lever_arm", "title": ARM.title, "evidence_nats": 812.4, "size": 8.0}
+    ]
+    assert calibration_json(lacking)["verdict"].startswith("doubtful: `sccal diagnose` would name antenna off")
+    html = run_html(lacking)
+    assert ARM.title in html
+    assert "sccal calibrate … --model OUT/model.json" in html
+    assert "lacks    by a quick look, lever_arm" in run_text(lacking, 100)
+    saved = Saved(Path("calibration.json"), calibration_json(lacking))
+    outcome = BatchOutcome((saved,), (), (), ())
+    assert f"lever\\_arm: {ARM.title}" in step_summary(outcome)
+    assert f"would name {ARM.title}" in junit_xml(outcome)
 
 
 def test_partial(a_run: Calibration) -> None:

@@ -1,0 +1,77 @@
+"""A calibration's effects with sigmas that own up to small amounts of everything else, and its model to be judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sccal.calibration.held_out import how, judge
+from sccal.calibration.result import Calibration, Estimate, HeldOut, Parameters, VehicleCalibration
+from sccal.evidence.extension import FreeEffects
+from sccal.evidence.model import Model, model_of
+from sccal.evidence.nuisance import sigmas_beside_small
+from sccal.filter.iterate import At, RunProblem
+from sccal.filter.start import Constants
+
+Effects = Mapping[str, Mapping[str, Estimate]]
+
+
+def model_of_run(calibration: Calibration, problem: RunProblem, heading_rate_hz: float) -> Model:
+    """The model that one run was calibrated with."""
+    return model_of([problem], [_at(problem, calibration.parameters, calibration.effects)], heading_rate_hz)
+
+
+def model_of_vehicle(vehicle: VehicleCalibration, problems: Sequence[RunProblem], heading_rate_hz: float) -> Model:
+    """The model of all runs of a vehicle."""
+    starts = [
+        _at(problem, vehicle.parameters, {**run.effects, **vehicle.effects})
+        for problem, run in zip(problems, vehicle.runs, strict=True)
+    ]
+    return model_of(problems, starts, heading_rate_hz)
+
+
+def judged_held_out(model: Model, window_s: float) -> HeldOut | None:
+    """Drift without fixes on data that fitted neither; None where no window fits into what is left out."""
+    judged = judge(model, window_s)
+    if judged.outage_end_rms_m is None:
+        return None
+    return HeldOut(judged.outage_rms_m, judged.outage_end_rms_m, how(model))
+
+
+def widened(effects: Effects, model: Model) -> Effects:
+    """A calibration's effects with sigmas as wide as small amounts of all other effects leave them.
+
+    Never below the fit's own, and with the part that no log shows.
+    """
+    if not model.accepted:
+        return effects
+    beside: dict[tuple[str, str], list[float]] = {}
+    for (effect, parameter, _), sigma in sigmas_beside_small(model).items():
+        beside.setdefault((effect.partition("(")[0], parameter), []).append(sigma)
+    hidden = {
+        (one.free.effect.name, parameter.name): parameter.hidden_sigma
+        for one in model.accepted
+        for parameter in one.free.parameters
+    }
+
+    def sigma_of(effect: str, parameter: str, own: float) -> float:
+        if (effect, parameter) not in hidden:
+            return own
+        others = np.array(beside.get((effect, parameter), [0.0]))
+        pooled = 0.0 if not others.all() else float(1.0 / np.sqrt((1.0 / others**2).sum()))
+        return float(np.hypot(max(own, pooled), hidden[effect, parameter]))
+
+    return {
+        effect: {name: replace(one, sigma=sigma_of(effect, name, one.sigma)) for name, one in parameters.items()}
+        for effect, parameters in effects.items()
+    }
+
+
+def _at(problem: RunProblem, parameters: Parameters, effects: Effects) -> At:
+    constants = Constants(parameters.radius_right_m.value, parameters.radius_left_m.value, parameters.track_m.value)
+    extension = problem.extension
+    free = extension.parameters if isinstance(extension, FreeEffects) else ()
+    values = np.array([effects[effect.name][one.name].value for effect, one in free], dtype=np.float64)
+    return At(constants, values)

@@ -1,0 +1,369 @@
+"""What has a searched shape: a moment, a place, a time constant, a threshold. Each is tried by the filter itself.
+
+All evidence for a jump lies around its moment, and the soft weights throw the first measurements after it away, so that
+linear evidence cannot see it. Here every suspected moment and place is put into the filter as a free parameter beside
+the model found so far, and the likelihood says how much better the run becomes. Suspects are where the innovations are
+large together, and a grid. An outlier can win nothing, since measurements are weighed softly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sccal.align import Timeline, build_timeline
+from sccal.arrays import Bools, Floats
+from sccal.diagnose.criteria import LEAST_NATS, SEARCH_NATS, SEARCH_T
+from sccal.effects.catalogue import CATALOGUE
+from sccal.effects.effect import Effect
+from sccal.evidence.candidates import Candidates
+from sccal.evidence.extension import Free, FreeEffects, view_run
+from sccal.evidence.model import Accepted, Model
+from sccal.filter.forward import ForwardPass
+from sccal.filter.iterate import At, RunProblem, prior_shift_nats
+from sccal.filter.layout import BASE_STATES
+from sccal.filter.noise import at_once
+
+HEADING_HZ, FIX_HZ, WHEEL_HZ, OUTPUT_HZ = 2.0, 1.0, 5.0, 1.0
+MOST_SECONDS = 1200.0
+"""A longer run is looked at in proportion more coarsely: a jump that matters there is one of minutes."""
+WINDOW_S = 4.0
+SUSPECTS = 6
+GRID = 14
+BESIDE_S = (0.0, 0.7, 1.5)
+"""A jump begins within a second or so of where its window does."""
+APART_S = 12.0
+EDGE_S = 20.0
+"""Nothing is looked for so near to the ends: a step there is a start."""
+ZOOMS, POINTS = 3, 7
+ANY_SIZE = 5.0
+"""Factor on the priors: a jump that the filter thinks impossible would be taken for outliers."""
+RADII_M = (1.5, 3.0, 6.0)
+PLACE_RADII = 1.0
+ORDINARY = 3.0
+"""A find must stand out so many times above what any other moment of the run gains."""
+MOST_RUNS = 3
+"""As many runs choose between the forms of a candidate; all of them refine what is found."""
+AROUND = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)
+LEAST_TAU_SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect with its moment or place, as found in one run."""
+
+    run: int
+    free: Free
+    values: Floats
+    """Of its free parameters, file units."""
+    sigmas: Floats
+    gain_nats: float
+    """In log-likelihood, less the price of the search."""
+    shape_sigmas: Mapping[str, float] = field(default_factory=dict)
+    """Of the place and its size; a moment is known to the reading."""
+
+    @property
+    def t(self) -> float:
+        """Size over its error, the moment or place as found."""
+        return float(np.max(np.abs(self.values) / self.sigmas))
+
+    @property
+    def size(self) -> float:
+        """Largest parameter in units of the smallest size that matters."""
+        least = np.array([one.matters for one in self.free.parameters])
+        return float(np.max(np.abs(self.values) / np.maximum(least, 1e-12)))
+
+    @property
+    def accepted(self) -> Accepted:
+        """As it enters a model."""
+        return Accepted(self.free, self.run)
+
+
+class Scan:
+    """One run, thinned, under a model's noise, so that a trial of one more effect costs one pass."""
+
+    def __init__(self, problem: RunProblem, at: At, timeline: Timeline | None = None) -> None:
+        if timeline is None:
+            first, last = problem.aligned.span_s
+            slower = max(1.0, (last - first) / MOST_SECONDS)
+            timeline = build_timeline(
+                problem.aligned, OUTPUT_HZ, HEADING_HZ / slower, FIX_HZ / slower, wheel_rate_hz=WHEEL_HZ / slower
+            )
+        self.problem = replace(problem, timeline=timeline)
+        self.at = at
+        self.clear = self.problem.clear_steps(at.constants)
+        self.view = view_run(self.problem, at, self.clear)
+        extension = problem.extension
+        self.effects = extension.effects if isinstance(extension, FreeEffects) else ()
+        self.base_nll, self.base = self._pass(self.problem, at)
+
+    def _pass(self, problem: RunProblem, at: At) -> tuple[float, ForwardPass]:
+        extension = problem.extension
+        columns = None
+        if isinstance(extension, FreeEffects):
+            columns = extension.columns_in(self.view, at.values, problem.timeline)
+        found = problem.begun(at, True, self.clear, columns, with_sigmas=False).finish()
+        return found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found), found
+
+    @property
+    def suspicious(self) -> dict[str, tuple[Floats, Floats]]:
+        """Times and squared, normalised innovations, by stream."""
+        timeline, aligned, found = self.problem.timeline, self.problem.aligned, self.base
+        heading = found.heading_nu_rad**2 / found.heading_var_rad2
+        fix = (found.fix_nu_m**2 / found.fix_var_m2[:, :2]).sum(axis=1)
+        return {
+            "headings": (aligned.heading_t_s[timeline.heading_index], heading),
+            "fixes": (aligned.fix_t_s[timeline.fix_index], fix),
+            "motion": (np.zeros(0), np.zeros(0)),
+        }
+
+    def trial(
+        self,
+        effect: Effect,
+        shapes: Mapping[str, float],
+        prior_scale: float = ANY_SIZE,
+        around: Floats | None = None,
+    ) -> tuple[float, Floats, Floats]:
+        """Gain in nats, values and sigmas of the effect's free parameters with its shapes as given.
+
+        ``around`` are values (m,) at which an effect that is not linear is taken; zero where nothing is known.
+        """
+        free = Free(effect, dict(shapes), prior_scale)
+        count, first = len(free.parameters), self.at.values.size
+        around = np.zeros(count) if around is None else around
+        problem = replace(self.problem, extension=FreeEffects((*self.effects, free)))
+        at = At(self.at.constants, np.concatenate((self.at.values, around)), self.at.path)
+        nll, found = self._pass(problem, at)
+        here = slice(BASE_STATES + first, BASE_STATES + first + count)
+        sigmas = np.sqrt(np.maximum(np.diag(found.final_covariance)[here], 1e-30))
+        gain = self.base_nll - nll
+        return (gain if np.isfinite(gain) else -np.inf), found.final_state[here].copy(), sigmas
+
+    def best(self, effect: Effect, tries: Sequence[Mapping[str, float]]) -> tuple[Mapping[str, float], Floats]:
+        """The most likely of some shapes, and the gains of all."""
+        with at_once() as map_at_once:
+            gains = np.array(list(map_at_once(lambda shapes: self.trial(effect, shapes)[0], list(tries))))
+        return tries[int(np.argmax(gains))], gains
+
+
+def find_moments(model: Model, run: int, known: Sequence[str]) -> list[Found]:
+    """Every effect of a moment or a place that stands out in one run and is not known, the largest gain first."""
+    problem = model.problems[run]
+    start_s, end_s = problem.aligned.span_s
+    if end_s - start_s < 4.0 * EDGE_S:
+        return []
+    scan = Scan(problem, model.at(run))
+    grid = np.linspace(EDGE_S, end_s - start_s - EDGE_S, GRID)
+    peaks = {stream: _peaks(*one, start_s, end_s) for stream, one in scan.suspicious.items()}
+    found: list[Found] = []
+    for effect in CATALOGUE.values():
+        if effect.name in known:
+            continue
+        suspects = peaks[effect.suspect_stream]
+        if effect.search == "moment":
+            found += _search_time(scan, problem, run, effect, suspects, grid)
+        elif effect.search == "place":
+            found += _search_place(scan, run, effect, suspects, grid)
+    good = [one for one in found if one.gain_nats >= LEAST_NATS and one.t >= SEARCH_T and one.size >= 1.0]
+    return sorted(good, key=lambda one: -one.gain_nats)
+
+
+def best_forms(model: Model, candidates: Candidates, kept: Sequence[Accepted]) -> list[Accepted]:
+    """Every candidate in one form: as it is kept, else as it alone beside the model makes the runs most likely."""
+    mine = {one.free.effect.name: one for one in kept if one.run is None}
+    scans: list[Scan] = []
+    chosen = []
+    for name, forms in candidates.forms.items():
+        if name in mine:
+            chosen.append(mine[name])
+            continue
+        best = forms[0]
+        if len(forms) > 1:
+            scans = scans or [Scan(model.problems[k], model.at(k)) for k in range(min(len(model.problems), MOST_RUNS))]
+            gains = [sum(scan.trial(free.effect, free.shapes, 1.0)[0] for scan in scans) for free in forms]
+            best = forms[int(np.argmax(gains))]
+        chosen.append(Accepted(best))
+    return chosen
+
+
+def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float]]:
+    """An effect of the model with its shapes where the likelihood of all runs is largest, and their sigmas."""
+    scans = [_without(model, run, accepted) for run in range(len(model.problems))]
+    shapes = dict(accepted.free.shapes)
+    effect, scale = accepted.free.effect, accepted.free.prior_scale
+    bounds = {one.name: (one.lower, one.upper) for one in effect.parameters if one.shape}
+
+    names = [(accepted.key, one.name) for one in accepted.free.parameters]
+    known = [model.values(run) for run in range(len(scans))]
+    around = [np.array([values[name] for name in names]) for values in known]
+
+    def gain(tried: Mapping[str, float]) -> float:
+        with at_once() as map_at_once:
+            pairs = list(zip(scans, around, strict=True))
+            return sum(map_at_once(lambda pair: pair[0].trial(effect, tried, scale, pair[1])[0], pairs))
+
+    sigmas: dict[str, float] = {}
+    for name, (low, high) in bounds.items():
+        least = LEAST_TAU_SHARE * high
+        reach = 1.0
+        for _ in range(ZOOMS):
+            middle = max(shapes[name], least)
+            points = np.unique(np.clip([shapes[name], low, *(middle * np.array(AROUND) ** reach)], low, high))
+            gains = np.array([gain({**shapes, name: float(point)}) for point in points])
+            shapes[name] = float(points[int(np.argmax(gains))])
+            reach *= 0.4
+        sigmas[name] = _width(points, gains)
+    return replace(accepted, free=replace(accepted.free, shapes=shapes)), sigmas
+
+
+def _width(points: Floats, gains: Floats) -> float:
+    """Sigma of a shape from the parabola through the gains about the best one; nan where they have no top."""
+    near = gains > gains.max() - 12.0
+    if near.sum() < 3:
+        return float(np.ptp(points[np.argsort(gains)[-2:]]))
+    curvature = float(np.polyfit(points[near] - points[int(np.argmax(gains))], gains[near], 2)[0])
+    return 1.0 / float(np.sqrt(-2.0 * curvature)) if curvature < 0.0 else float("nan")
+
+
+def _without(model: Model, run: int, accepted: Accepted) -> Scan:
+    """One run's scan with an effect of the model taken out."""
+    problem, at = model.problems[run], model.at(run)
+    assert isinstance(problem.extension, FreeEffects)
+    keep = np.array([free.key != accepted.key for free in problem.extension.effects for _ in free.parameters])
+    rest = tuple(free for free in problem.extension.effects if free.key != accepted.key)
+    extension = FreeEffects(rest) if rest else None
+    return Scan(replace(problem, extension=extension), At(at.constants, at.values[keep], at.path))
+
+
+def _search_time(
+    scan: Scan, whole: RunProblem, run: int, effect: Effect, suspects: Floats, grid: Floats
+) -> list[Found]:
+    around = (suspects[:, None] + np.array(BESIDE_S)).ravel()
+    tries = np.concatenate((around, grid))
+    best, gains = scan.best(effect, [{"at_s": float(s)} for s in tries])
+    ordinary = _ordinary(gains[around.size :])
+    step = float(grid[1] - grid[0]) if not np.isin(best["at_s"], around) else WINDOW_S
+    limit = (float(grid[0]), float(grid[-1]))
+    for _ in range(ZOOMS):
+        nearby = np.clip(best["at_s"] + step * np.linspace(-1.0, 1.0, POINTS), *limit)
+        best, _ = scan.best(effect, [{"at_s": float(s)} for s in nearby])
+        step *= 2.0 / (POINTS - 1)
+    return [_settled(whole, one, scan) for one in _found(scan, run, effect, best, ordinary)]
+
+
+def _settled(whole: RunProblem, rough: Found, scan: Scan) -> Found:
+    """The moment to the reading: a parameter that is free one reading early is fitted to that reading."""
+    timeline = whole.timeline
+    headings = rough.free.effect.suspect_stream == "headings"
+    index = timeline.heading_index if headings else timeline.fix_index
+    of = whole.aligned.heading_t_s if headings else whole.aligned.fix_t_s
+    t_s = of[index] - whole.aligned.span_s[0]
+    near = t_s[np.abs(t_s - rough.free.shapes["at_s"]) < 2.0 / FIX_HZ]
+    if near.size < 2:
+        return rough
+    fine = Scan(whole, scan.at, timeline)
+    between = 0.5 * (near[1:] + near[:-1])
+    best, _ = fine.best(rough.free.effect, [{"at_s": float(s)} for s in between[:: max(between.size // 24, 1)]])
+    _, values, sigmas = fine.trial(rough.free.effect, best)
+    return replace(rough, free=replace(rough.free, shapes=dict(best)), values=values, sigmas=sigmas)
+
+
+def _search_place(scan: Scan, run: int, effect: Effect, suspects: Floats, grid: Floats) -> list[Found]:
+    seen = scan.view.headings
+    start_s = scan.problem.aligned.span_s[0]
+
+    def at(since_s: float, radius_m: float) -> dict[str, float]:
+        return {
+            "east_m": float(np.interp(start_s + since_s, seen.t_s, seen.east_m)),
+            "north_m": float(np.interp(start_s + since_s, seen.t_s, seen.north_m)),
+            "radius_m": radius_m,
+        }
+
+    anywhere = [at(float(s), RADII_M[1]) for s in grid]
+    _, usual = scan.best(effect, anywhere)
+    tries = [at(float(s), radius) for s in suspects for radius in RADII_M]
+    best, _ = scan.best(effect, [*tries, anywhere[int(np.argmax(usual))]])
+    step = 1.0
+    for _ in range(2 * ZOOMS):
+        before = best
+        for name in ("east_m", "north_m"):
+            size = step * before["radius_m"]
+            best, _ = scan.best(effect, [{**best, name: best[name] + size * k} for k in (-1.0, -0.5, 0.0, 0.5, 1.0)])
+        best, _ = scan.best(effect, [{**best, "radius_m": best["radius_m"] * k} for k in (0.7, 0.85, 1.0, 1.2, 1.4)])
+        if best == before:
+            step *= 0.5
+    return [_with_place_errors(scan, one) for one in _found(scan, run, effect, best, _ordinary(usual))]
+
+
+def _with_place_errors(scan: Scan, found: Found) -> Found:
+    """Sigmas of the place and its size from the curvature of the likelihood, and what they do to the effect's size.
+
+    A robot that passes a place once on a straight line sees neither on which side it lies nor how far off: a weak field
+    nearby and a strong one further away are the same to it.
+    """
+    names = ("east_m", "north_m", "radius_m")
+    radius = found.free.shapes["radius_m"]
+    steps = np.array([0.3, 0.3, 0.2]) * radius
+
+    def at(offset: Floats) -> tuple[float, Floats]:
+        shapes = {name: found.free.shapes[name] + float(d) for name, d in zip(names, offset, strict=True)}
+        gain, values, _ = scan.trial(found.free.effect, shapes)
+        return gain, values
+
+    units = np.diag(steps)
+    here, _ = at(np.zeros(3))
+    curvature = np.zeros((3, 3))
+    slopes = np.zeros((3, found.values.size))
+    for i in range(3):
+        (up, more), (down, less) = at(units[i]), at(-units[i])
+        curvature[i, i] = -(up - 2.0 * here + down) / steps[i] ** 2
+        slopes[i] = (more - less) / (2.0 * steps[i])
+        for j in range(i):
+            crossed = [at(a * units[i] + b * units[j])[0] * a * b for a in (1.0, -1.0) for b in (1.0, -1.0)]
+            curvature[i, j] = curvature[j, i] = -sum(crossed) / (4.0 * steps[i] * steps[j])
+    # Known no better than to a few radii in any direction, which also keeps a flat or saddled likelihood in hand.
+    values, vectors = np.linalg.eigh(curvature)
+    least = 1.0 / (PLACE_RADII * radius) ** 2
+    covariance = vectors @ np.diag(1.0 / np.maximum(values, least)) @ vectors.T
+    sigmas = np.sqrt(found.sigmas**2 + np.einsum("ik,ij,jk->k", slopes, covariance, slopes))
+    of_place = {name: float(sigma) for name, sigma in zip(names, np.sqrt(np.diag(covariance)), strict=True)}
+    return replace(found, sigmas=sigmas, shape_sigmas=of_place)
+
+
+def _found(scan: Scan, run: int, effect: Effect, shapes: Mapping[str, float], ordinary: float) -> list[Found]:
+    gain, values, sigmas = scan.trial(effect, shapes)
+    gain -= SEARCH_NATS + ORDINARY * ordinary
+    return [Found(run, Free(effect, dict(shapes), ANY_SIZE), values, sigmas, gain)] if gain > 0.0 else []
+
+
+def _ordinary(gains: Floats) -> float:
+    """What an arbitrary moment gains in this run: nothing, where the noise is what the filter takes it for."""
+    return float(max(np.quantile(gains, 0.2), 0.0))
+
+
+def _peaks(t_s: Floats, squared: Floats, start_s: float, end_s: float) -> Floats:
+    """Times since the start at which innovations are large together, the largest first; single outliers apart."""
+    if t_s.size < 10:
+        return np.zeros(0)
+    inside: Bools = (t_s > start_s + EDGE_S) & (t_s < end_s - EDGE_S)
+    edges = np.arange(start_s + EDGE_S, end_s - EDGE_S, 0.5 * WINDOW_S)
+    values = np.minimum(np.sqrt(squared), 30.0)
+    scores = []
+    for edge in edges:
+        here = values[inside & (t_s >= edge) & (t_s < edge + WINDOW_S)]
+        scores.append(float(np.median(here)) if here.size >= 3 else 0.0)
+    order = np.argsort(scores)[::-1]
+    chosen: list[float] = []
+    for k in order:
+        # The jump stands where the window begins to be bad: about its largest innovation.
+        here = inside & (t_s >= edges[k]) & (t_s < edges[k] + WINDOW_S)
+        if not here.any():
+            continue
+        at = float(t_s[here][int(np.argmax(values[here]))]) - start_s - 0.25
+        if all(abs(at - other) > APART_S for other in chosen):
+            chosen.append(at)
+        if len(chosen) == SUSPECTS:
+            break
+    return np.array(chosen)

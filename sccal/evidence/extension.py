@@ -1,0 +1,228 @@
+"""Effects as further parameters of the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sccal.align import Aligned, Timeline
+from sccal.arrays import Floats
+from sccal.effects.catalogue import effect_named
+from sccal.effects.effect import Column, Effect, Parameter
+from sccal.effects.logged import logged_effects
+from sccal.effects.view import Belief, DriveView, view_drive
+from sccal.errors import DataError, UsageError
+from sccal.filter.columns import HeadingBend, Placed, kernel_columns
+from sccal.filter.iterate import At, RunProblem
+from sccal.filter.layout import Columns
+
+SMALL_RAD = 1e-3
+SMALL_SHARE = 1e-3
+"""Steps of the derivatives by the heading, and by a parameter as a share of its prior."""
+MIN_PATH = 10
+"""Output times of a pass below which it does not show the path: the noise search keeps almost none."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """One effect whose parameters the filter estimates, its shapes (a place, a time) as found by a search."""
+
+    effect: Effect
+    shapes: Mapping[str, float] = field(default_factory=dict)
+    prior_scale: float = 1.0
+    """Factor on the priors: below one for an effect that is in the model only because every log has a little of it."""
+
+    @property
+    def key(self) -> str:
+        """The effect's name, with its shapes where it has any: "hard_iron(tau_s=8)"."""
+        if not self.shapes:
+            return self.effect.name
+        return f"{self.effect.name}({', '.join(f'{name}={value:.6g}' for name, value in self.shapes.items())})"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those that are estimated."""
+        return tuple(one for one in self.effect.parameters if not one.shape)
+
+    def placed(self, view: DriveView, values: Sequence[float], first: int) -> list[Placed]:
+        """Its columns made at the values of its parameters, numbered from ``first``."""
+        number = {one.name: first + k for k, one in enumerate(self.parameters)}
+        at = {one.name: float(value) for one, value in zip(self.parameters, values, strict=True)}
+        return [Placed(number[column.parameter], column) for column in self.effect.columns(view, {**at, **self.shapes})]
+
+    def delay_s(self, view: DriveView, values: Sequence[float]) -> Floats | None:
+        """How old the effect makes the fixes (f,); None for an effect that has nothing to do with it."""
+        at = {one.name: float(value) for one, value in zip(self.parameters, values, strict=True)}
+        return self.effect.fix_delay_s(view, {**at, **self.shapes})
+
+    def turns(self, view: DriveView, values: Floats) -> Floats:
+        """What the effect adds to the heading readings (h,) at some values of its parameters, rad."""
+        added = np.zeros(view.headings.t_s.size)
+        for one in self.placed(view, values.tolist(), 0):
+            column = one.column
+            if column.port == "heading":
+                added = added + values[one.parameter] * column.values
+        return added
+
+
+@dataclass(frozen=True)
+class FreeEffects:
+    """Some effects, their parameters free, in the order given: those of the vehicle before those of one run alone."""
+
+    effects: tuple[Free, ...]
+
+    @classmethod
+    def named(cls, names: Sequence[str], aligned: Aligned | None = None) -> FreeEffects | None:
+        """By name; None for no names. A further column of the log is named by port and column: heading~motor_current_a.
+
+        Raises UsageError for unknown ones, and for those that need a search; DataError where the log lacks the column.
+        """
+        effects = tuple(Free(effect_by_name(name, aligned)) for name in dict.fromkeys(names))
+        for free in effects:
+            shapes = [parameter.name for parameter in free.effect.parameters if parameter.shape]
+            if shapes:
+                raise UsageError(
+                    f"effect {free.effect.name}: its {', '.join(shapes)} must be searched for, not filtered: "
+                    "`sccal diagnose` does"
+                )
+        return cls(effects) if effects else None
+
+    @property
+    def parameters(self) -> tuple[tuple[Effect, Parameter], ...]:
+        """Every free parameter with its effect, as the filter holds them."""
+        return tuple((free.effect, parameter) for free in self.effects for parameter in free.parameters)
+
+    @property
+    def prior_sigmas(self) -> Floats:
+        """(m,) about zero, in file units."""
+        return np.array([free.prior_scale * one.prior_sigma for free in self.effects for one in free.parameters])
+
+    def columns(self, problem: RunProblem, at: At, clear: tuple[Floats, Floats]) -> Columns:
+        """The kernel's columns, linearised at the given values along the given path."""
+        return self.columns_in(view_run(problem, at, clear), at.values, problem.timeline)
+
+    def columns_in(self, view: DriveView, values: Floats, timeline: Timeline) -> Columns:
+        """The same for a drive that is seen already."""
+        derivatives, bend = self._bent(view, values, self.placed(view, values))
+        return kernel_columns(derivatives, timeline, bend)
+
+    def _bent(
+        self, view: DriveView, values: Floats, placed: Sequence[Placed]
+    ) -> tuple[Sequence[Placed], HeadingBend | None]:
+        """Columns at the heading as derivatives at the given values, and what makes the whole exact there.
+
+        With D(p, ψ) what an effect does to the reading, and c = ∂D/∂p: D(p₀, ψ₀) − c p₀ is known, and ∂D/∂ψ is how much
+        more than by itself the reading turns with the robot. Secants, which the effects give, are D over p.
+        """
+        first, bent = 0, False
+        known, slope = np.zeros(view.headings.t_s.size), np.zeros(view.headings.t_s.size)
+        derivatives = {(one.parameter, one.column.port): one for one in placed}
+        others = [one for one in placed if one.column.port != "heading"]
+        turned = replace(view, headings=replace(view.headings, yaw_rad=view.headings.yaw_rad + SMALL_RAD))
+        for free in self.effects:
+            size = len(free.parameters)
+            at = values[first : first + size]
+            here = [derivatives.get((first + k, "heading")) for k in range(size)]
+            if any(one is not None for one in here) and at.any():
+                does = free.turns(view, at)
+                more = (free.turns(turned, at) - does) / SMALL_RAD
+                by_parameter = np.zeros((size, does.size))
+                for k, parameter in enumerate(free.parameters):
+                    step = SMALL_SHARE * parameter.prior_sigma * np.eye(size)[k]
+                    by_parameter[k] = (free.turns(view, at + step) - free.turns(view, at - step)) / (2.0 * step[k])
+                known += does - at @ by_parameter
+                slope += more
+                bent = True
+                here = [
+                    Placed(first + k, Column(p.name, "heading", by_parameter[k])) for k, p in enumerate(free.parameters)
+                ]
+            others += [one for one in here if one is not None]
+            first += size
+        if not bent:
+            return placed, None
+        return others, HeadingBend(known, slope, view.headings.yaw_rad)
+
+    def placed(self, view: DriveView, values: Floats) -> list[Placed]:
+        """All columns made at the given values (m,); where fixes are old, arms turn with the robot meanwhile."""
+        placed: list[Placed] = []
+        turned = self._turned_rad(view, values)
+        first = 0
+        for free in self.effects:
+            last = first + len(free.parameters)
+            mine = values[first:last].tolist()
+            columns = free.placed(view, mine, first)
+            if turned is not None and free.delay_s(view, mine) is None:
+                columns = _turned_back(columns, turned)
+            placed += columns
+            first = last
+        return placed
+
+    def _turned_rad(self, view: DriveView, values: Floats) -> Floats | None:
+        """How far the robot turned between what each fix shows and its stamp (f,); None where no fix is old."""
+        first, total = 0, np.zeros(view.fixes.t_s.size)
+        for free in self.effects:
+            last = first + len(free.parameters)
+            delay = free.delay_s(view, values[first:last].tolist())
+            total = total if delay is None else total + delay
+            first = last
+        if not total.any():
+            return None
+        so_far = np.cumsum(view.steps.turn_rad)
+        now, then = (np.interp(t_s, view.steps.t_s, so_far) for t_s in (view.fixes.t_s, view.fixes.t_s - total))
+        return np.asarray(now - then)
+
+
+def _turned_back(placed: Sequence[Placed], turned_rad: Floats) -> list[Placed]:
+    """Columns at the antenna as the robot stood before it turned by so much (f,)."""
+    found: list[Placed] = []
+    c, s = np.cos(turned_rad), np.sin(turned_rad)
+    for one in placed:
+        column = one.column
+        if column.port not in ("antenna_forward", "antenna_left"):
+            found.append(one)
+            continue
+        # Rot(−α) (f, l) = (f cos α + l sin α, −f sin α + l cos α)
+        forward, left = (c, -s) if column.port == "antenna_forward" else (s, c)
+        found.append(Placed(one.parameter, Column("", "antenna_forward", forward * column.values)))
+        found.append(Placed(one.parameter, Column("", "antenna_left", left * column.values)))
+    return found
+
+
+def view_run(problem: RunProblem, at: At, clear: tuple[Floats, Floats] | None) -> DriveView:
+    """The drive as columns see it, along the given path."""
+    return view_drive(problem.aligned, problem.timeline, _belief(problem, at), clear)
+
+
+def effect_by_name(name: str, aligned: Aligned | None) -> Effect:
+    """An effect of the catalogue, or of a column of the run.
+
+    Raises:
+        UsageError: no effect has that name.
+        DataError: the log lacks the column.
+    """
+    if "~" not in name:
+        return effect_named(name)
+    logged = {one.name: one for one in logged_effects([aligned.extras] if aligned else [])}
+    if name not in logged:
+        raise DataError(
+            f"effect {name!r}: this log has no such further column that varies; "
+            + (f"there are {', '.join(logged)}" if logged else "it has none at all")
+        )
+    return logged[name]
+
+
+def _belief(problem: RunProblem, at: At) -> Belief:
+    """The path of an earlier pass, or the wheels laid out along the AHRS yaw from where the run starts."""
+    constants, start = at.constants, problem.start
+    if at.path is not None:
+        state = at.path.state
+        t_s, east, north, yaw = at.path.timeline.out_t_s, state[:, 0], state[:, 1], state[:, 2]
+    if at.path is None or t_s.size < MIN_PATH:
+        aligned = problem.aligned
+        turned = start.wheel_scale * np.exp(-1j * start.offset_rad) * aligned.path_along_yaw
+        t_s = aligned.wheel_t_s
+        east, north = start.east_m + turned.real, start.north_m + turned.imag
+        yaw = np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad) - start.offset_rad
+    return Belief(constants.radius_right_m, constants.radius_left_m, constants.track_m, t_s, yaw, east, north)

@@ -1,0 +1,212 @@
+"""Some runs with the effects that are in the model: their noise, the joint fit, and where each run stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sccal.align import Aligned, Timeline, build_timeline
+from sccal.arrays import Floats
+from sccal.effects.view import DriveView
+from sccal.evidence.extension import Free, FreeEffects, view_run
+from sccal.evidence.joint import JointFit, fit_jointly, names_of
+from sccal.evidence.parallel import each
+from sccal.filter.forward import ForwardPass
+from sccal.filter.iterate import At, RunProblem, iterate
+from sccal.filter.levels import Noise
+from sccal.filter.noise import COARSE_HZ, PATH_HZ, Reach, estimate_noise
+from sccal.filter.options import FilterOptions
+from sccal.filter.start import Constants, find_start
+
+OUTPUT_RATE_HZ = 5.0
+FIX_RATE_HZ = 5.0
+WHEEL_RATE_HZ = 20.0
+ROUNDS = 6
+ROUNDS_BEFORE = 2
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """An effect in the model; ``run`` where it belongs to one run alone (a step, a place)."""
+
+    free: Free
+    run: int | None = None
+
+    @property
+    def key(self) -> str:
+        """The effect with its shapes."""
+        return self.free.key
+
+
+@dataclass(frozen=True)
+class Model:
+    """Some runs, the accepted effects, and the fit."""
+
+    accepted: tuple[Accepted, ...]
+    problems: tuple[RunProblem, ...]
+    fit: JointFit
+    heading_rate_hz: float
+
+    @property
+    def nll(self) -> float:
+        """Negative log-likelihood of all runs, constants and effects marginalised."""
+        return self.fit.nll
+
+    def at(self, run: int) -> At:
+        """Where a run's passes start and linearise."""
+        theta = self.fit.each[run]
+        return At(Constants.of(theta), theta[3:], self.fit.runs[run].path)
+
+    def path(self, run: int) -> ForwardPass:
+        """The last pass over a run."""
+        return self.fit.runs[run].path
+
+    def view(self, run: int) -> DriveView:
+        """A run as columns see it."""
+        problem, at = self.problems[run], self.at(run)
+        return view_run(problem, at, problem.clear_steps(at.constants))
+
+    def values(self, run: int) -> dict[tuple[str, str], float]:
+        """What a run holds of every effect's parameters."""
+        return dict(zip(names_of(self.problems[run]), self.fit.each[run][3:].tolist(), strict=True))
+
+
+def timeline_of(aligned: Aligned, heading_rate_hz: float) -> Timeline:
+    """Events for a diagnosis: what its slowest candidate needs, and no more."""
+    return build_timeline(aligned, OUTPUT_RATE_HZ, heading_rate_hz, FIX_RATE_HZ, wheel_rate_hz=WHEEL_RATE_HZ)
+
+
+def thinned_timeline_of(aligned: Aligned) -> Timeline:
+    """Events for a quick look."""
+    heading_hz, fix_hz, wheel_hz = COARSE_HZ
+    return build_timeline(aligned, PATH_HZ, heading_hz, fix_hz, wheel_rate_hz=wheel_hz)
+
+
+def model_of(
+    problems: Sequence[RunProblem], starts: Sequence[At], heading_rate_hz: float, thinned: bool = False
+) -> Model:
+    """Runs whose noise and effects are known, fitted together from where each stands.
+
+    The events are those of a diagnosis, or the few of a quick look.
+    """
+    ready = [
+        replace(
+            problem,
+            timeline=thinned_timeline_of(problem.aligned) if thinned else timeline_of(problem.aligned, heading_rate_hz),
+            options=replace(problem.options, soft_gate=True),
+        )
+        for problem in problems
+    ]
+    held: dict[str, list[tuple[Free, int]]] = {}
+    for run, problem in enumerate(ready):
+        if isinstance(problem.extension, FreeEffects):
+            for free in problem.extension.effects:
+                held.setdefault(free.key, []).append((free, run))
+    everywhere: list[Accepted] = []
+    for some in held.values():
+        if len(some) == len(ready):
+            everywhere.append(Accepted(some[0][0]))
+        else:
+            everywhere += [Accepted(free, run) for free, run in some]
+    fit = fit_jointly(ready, starts, ROUNDS, with_stretches=True)
+    return Model(tuple(everywhere), tuple(ready), fit, heading_rate_hz)
+
+
+def extension_of(accepted: Sequence[Accepted], run: int) -> FreeEffects | None:
+    """The accepted effects that a run has."""
+    mine = tuple(one.free for one in accepted if one.run is None or one.run == run)
+    return FreeEffects(mine) if mine else None
+
+
+def bare_model(runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: float) -> Model:
+    """The paper's model alone, its noise searched for over the whole prior.
+
+    Raises:
+        DataError: where a run hardly moves.
+    """
+    soft = replace(options, soft_gate=True)
+
+    def prepared(aligned: Aligned) -> tuple[RunProblem, At]:
+        start = find_start(aligned)
+        noise, _ = estimate_noise(aligned, start, options, heading_rate_hz)
+        problem = RunProblem(aligned, timeline_of(aligned, heading_rate_hz), start, noise, soft)
+        values, found = iterate(problem, problem.at_centre())
+        return problem, At(Constants.of(values), values[4:], found)
+
+    ready = each(prepared, runs)
+    problems = [problem for problem, _ in ready]
+    fit = fit_jointly(problems, [first for _, first in ready], ROUNDS, with_stretches=True)
+    return Model((), tuple(problems), fit, heading_rate_hz)
+
+
+def refitted(
+    model: Model,
+    accepted: Sequence[Accepted],
+    starts: Sequence[At] = (),
+    reach: Reach | None = Reach.NEAR,
+    noises: Sequence[Noise] = (),
+    rounds: int = ROUNDS,
+) -> Model:
+    """The same runs with other effects.
+
+    Parameters
+    ----------
+    model
+        Where the fit starts.
+    accepted
+        The effects to be in the model.
+    starts
+        Per run, where its fit starts; without them where ``model`` stands, what is not in it yet at zero.
+    reach
+        How widely the noise is searched for; None keeps the noise.
+    noises
+        Per run, a noise to take instead of the model's.
+    rounds
+        Passes over every run at most.
+    """
+
+    def prepared(k: int) -> tuple[RunProblem, At]:
+        before = model.problems[k]
+        extension = extension_of(accepted, k)
+        first = starts[k] if starts else _carried(model, k, extension)
+        problem = replace(before, extension=extension, noise=noises[k] if noises else before.noise)
+        if reach is not None:
+            # Under the noise of a model that lacks the effects they come near, so that the search starts from there.
+            values, found = iterate(problem, first, ROUNDS_BEFORE, with_sigmas=False)
+            first = At(Constants.of(values), values[4:], found)
+            noise, settled = estimate_noise(
+                before.aligned,
+                before.start,
+                before.options,
+                model.heading_rate_hz,
+                extension,
+                first,
+                [problem.noise, before.noise],
+                reach,
+            )
+            problem = replace(problem, noise=noise)
+            # The path over the whole run: the search saw a stretch of it.
+            first = At(settled.constants, settled.values, first.path)
+        return problem, first
+
+    ready = each(prepared, range(len(model.problems)))
+    problems = [problem for problem, _ in ready]
+    fit = fit_jointly(problems, [first for _, first in ready], rounds, with_stretches=True)
+    return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz)
+
+
+def _carried(model: Model, run: int, extension: FreeEffects | None) -> At:
+    """Start of a run's fit: what is known of it already."""
+    at = model.at(run)
+    if extension is None:
+        return At(at.constants, np.zeros(0))
+    known = model.values(run)
+    # Another form of an effect starts where the one before it stands.
+    of_name = {(key.partition("(")[0], name): value for (key, name), value in known.items()}
+    wanted = [(free, one.name) for free in extension.effects for one in free.parameters]
+    values: Floats = np.array(
+        [known.get((free.key, name), of_name.get((free.effect.name, name), 0.0)) for free, name in wanted]
+    )
+    return At(at.constants, values, at.path)

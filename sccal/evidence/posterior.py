@@ -1,0 +1,119 @@
+"""The evidence of every subset of some effects, in closed form.
+
+With everything free under priors N(0, Λ) the fit leaves N(µ, C). Holding the parameters A of the other effects at zero
+changes the log-evidence by log N(0; µ_A, C_AA) − log N(0; 0, Λ_AA) (Savage and Dickey; Verdinelli and Wasserman 1995).
+In units of the priors, with J = C⁻¹ and h = J µ, the evidence of keeping K and holding the rest at zero is therefore,
+up to a constant,
+
+    E(K) = ½ h_Kᵀ J_KK⁻¹ h_K − ½ log det J_KK
+
+and the values given that the rest is zero are J_KK⁻¹ h_K with the covariance J_KK⁻¹. Occam's price is in the
+determinant: a parameter that the data do not need costs what it could have done and did not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sccal.arrays import Floats, Ints
+
+CONSTANTS = 3
+"""R_r, R_l and L are in every model."""
+MOST_SWAPPED = 24
+"""Exchanges are tried up to so many kept effects: beyond, a log that needs them all is not described by any."""
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What the saturated fit says of some effects, in units of their priors' sigmas."""
+
+    rows: Mapping[str, Ints]
+    """Of each effect (by key): the places of its parameters, all runs' copies."""
+    mean: Floats
+    """(G,) of R_r, R_l, L, then all effects' parameters."""
+    covariance: Floats
+    """(G, G), everything else marginalised."""
+    sigma: Floats
+    """(G,) the priors' sigmas in file units (of the constants: their values)."""
+    price_nats: Mapping[str, float]
+    """What each effect must bring for being there at all: minus the logarithm of its prior odds."""
+
+    @cached_property
+    def _information(self) -> tuple[Floats, Floats]:
+        J = np.linalg.inv(self.covariance)
+        J = 0.5 * (J + J.T)
+        return J, J @ self.mean
+
+    def places(self, kept: Sequence[str]) -> Ints:
+        """The constants, and all parameters of some effects."""
+        return np.concatenate([np.arange(CONSTANTS), *(self.rows[name] for name in kept)]).astype(np.int64)
+
+    def evidence(self, kept: Sequence[str]) -> float:
+        """Logarithm of the evidence of keeping some effects and no others, over that of keeping none, prices paid."""
+        return self._evidence(self.places(kept)) - self._none - sum(self.price_nats.get(name, 0.0) for name in kept)
+
+    @cached_property
+    def _none(self) -> float:
+        return self._evidence(self.places(()))
+
+    def _evidence(self, places: Ints) -> float:
+        J, h = self._information
+        try:
+            root = np.linalg.cholesky(J[np.ix_(places, places)])
+        except np.linalg.LinAlgError:
+            return -np.inf
+        scaled = np.linalg.solve(root, h[places])
+        return float(0.5 * scaled @ scaled - np.log(np.diag(root)).sum())
+
+    def given(self, kept: Sequence[str]) -> tuple[Floats, Floats]:
+        """Mean (3 + k,) and covariance of constants and kept parameters if the rest is zero, in their priors' units."""
+        places = self.places(kept)
+        J, h = self._information
+        covariance: Floats = np.asarray(np.linalg.inv(J[np.ix_(places, places)]), dtype=np.float64)
+        return covariance @ h[places], covariance
+
+    def worth(self, name: str, kept: Sequence[str]) -> float:
+        """What one of the kept effects brings: the evidence with it over that without."""
+        return self.evidence(kept) - self.evidence([one for one in kept if one != name])
+
+    def gain(self, name: str, kept: Sequence[str]) -> float:
+        """What an effect would bring beside the kept ones."""
+        return self.evidence([*kept, name]) - self.evidence(kept)
+
+    def select(self, first: Sequence[str] = ()) -> list[str]:
+        """The subset of most evidence, by adding, removing and exchanging until none of it helps.
+
+        Two ways lead there, from nothing (or ``first``) upward and from everything downward; the better end counts.
+        """
+        ends = [self._climbed(list(first)), self._climbed(self._thinned())]
+        return max(ends, key=self.evidence)
+
+    def _thinned(self) -> list[str]:
+        """Everything, less what brings nothing, the most useless first."""
+        kept = list(self.rows)
+        while len(kept) > 1:
+            least = min(kept, key=lambda name: self.worth(name, kept))
+            if self.worth(least, kept) > 0.0:
+                break
+            kept.remove(least)
+        return kept
+
+    def _climbed(self, kept: list[str]) -> list[str]:
+        best = self.evidence(kept)
+        while True:
+            moves = [[one for one in kept if one != name] for name in kept]
+            others = [name for name in self.rows if name not in kept]
+            moves += [[*kept, name] for name in others]
+            if len(kept) <= MOST_SWAPPED:
+                moves += [[*(one for one in kept if one != gone), name] for gone in kept for name in others]
+            if not moves:
+                return kept
+            values = [self.evidence(move) for move in moves]
+            place = int(np.argmax(values))
+            if values[place] <= best + 1e-9:
+                return kept
+            best, kept = values[place], moves[place]
