@@ -15,7 +15,7 @@ from sccal.calibration.held_out import expected_of_one_more, how_of_runs
 from sccal.calibration.outage import run_with_outages, summarise
 from sccal.calibration.result import Calibration, HeldOut, OutageWindow
 from sccal.calibration.shared import SharedLikelihood, pooled
-from sccal.evidence.model import timeline_of
+from sccal.evidence.model import timeline_of, trust_in
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
 
@@ -48,7 +48,7 @@ def windows_by_others(
     problem: RunProblem, said: SaidByOthers, heading_rate_hz: float, window_s: float
 ) -> tuple[OutageWindow, ...]:
     """A run's windows without fixes, its constants those that the others say."""
-    timeline = timeline_of(problem.aligned, heading_rate_hz)
+    timeline = timeline_of(problem.aligned, heading_rate_hz, trust_in(problem.noise))
     run_problem = replace(problem, timeline=timeline, options=replace(problem.options, soft_gate=True))
     run = run_problem.begun(At(Constants.of(said.mode), np.zeros(0)), linearise_there=True)
     whole = run.belief.covariance()

@@ -14,17 +14,16 @@ def pairs_of(
     prefix: str, a: Mapping[str, SavedEstimate], b: Mapping[str, SavedEstimate], sigmas: float
 ) -> tuple[Pair, ...]:
     """Every parameter of either, those of A first; ``prefix`` is ``parameters`` or ``effects.NAME``."""
-    effect = prefix.partition(".")[2]
+    keys = tuple(dict.fromkeys((*a, *b)))
     return tuple(
-        _pair(f"{prefix}.{key}", effect, key, a.get(key), b.get(key), sigmas) for key in dict.fromkeys((*a, *b))
+        _pair(f"{prefix}.{key}", key, a.get(key), b.get(key), why_own_log_only(key, keys), sigmas) for key in keys
     )
 
 
-def _pair(name: str, effect: str, key: str, a: SavedEstimate | None, b: SavedEstimate | None, sigmas: float) -> Pair:
+def _pair(name: str, key: str, a: SavedEstimate | None, b: SavedEstimate | None, own: str, sigmas: float) -> Pair:
     if a is None or b is None:
         return Pair(name, a, b, None, "not comparable", f"only {'B' if a is None else 'A'} has it")
     reasons = [f"{side}: {why}" for side, one in (("A", a), ("B", b)) if (why := why_not_estimated(one))]
-    own = why_own_log_only(effect, key)
     if own or reasons:
         return Pair(name, a, b, None, "not comparable", own or "; ".join(reasons))
     d = difference(key, a, b)

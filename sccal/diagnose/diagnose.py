@@ -19,7 +19,14 @@ from sccal.calibration.result import Estimate, OutageWindow, Parameters
 from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.calibration.single import describe_drive
 from sccal.calibration.status import judge as judge_parameters
-from sccal.diagnose.criteria import ALIKE_NATS, ALIKE_SHARE, LEAST_NATS, PRICE_NATS
+from sccal.diagnose.criteria import (
+    ALIKE_NATS,
+    ALIKE_SHARE,
+    CLEARLY_LESS,
+    LEAST_NATS,
+    MISFIT_TOLD,
+    PRICE_NATS,
+)
 from sccal.diagnose.excitation import excitation
 from sccal.diagnose.loop import Loop, Sized, run_loop, values_in
 from sccal.diagnose.picture import picture_of
@@ -36,7 +43,7 @@ from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.logged import LoggedColumn
 from sccal.evidence.extension import Free
 from sccal.evidence.joint import Key
-from sccal.evidence.model import Accepted, Model, refitted
+from sccal.evidence.model import Accepted, Model, Trust, refitted
 from sccal.evidence.nonsense import NonsenseColumn, with_nonsense
 from sccal.evidence.nuisance import sigmas_beside_small
 from sccal.evidence.posterior import Posterior
@@ -45,10 +52,16 @@ from sccal.filter.noise import Reach
 
 BOOTSTRAP = 400
 RANKED = 8
-TRUST = (
-    "noise, constants and effects estimated together from every run's innovations; measurements count by their "
-    "probability of being no outliers"
-)
+TRUST = {
+    Trust.DETAIL: (
+        "noise, constants and effects estimated together from every run's innovations; measurements count by their "
+        "probability of being no outliers"
+    ),
+    Trust.PATH: (
+        "nothing may wander: fixes and wheels trusted as far as the whole path meets them, because details of these "
+        "logs are wrong in ways that no noise describes"
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -69,6 +82,8 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     """
     dressed, nonsense = with_nonsense(runs)
     loop = run_loop(runs, options.filter, options.heading_rate_hz)
+    if loop.model.fit.misfit > MISFIT_TOLD:
+        loop = _more_trusted(loop, runs, options)
     placebo = _chance(loop, dressed, nonsense)
     before = judge(loop.first, options.outage_window_s)
     told = _steps(loop, before, options.outage_window_s)
@@ -80,7 +95,7 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     return Diagnosis(
         runs=tuple(run.name for run in runs),
         vehicle=runs[0].vehicle,
-        trust=TRUST,
+        trust=TRUST[loop.model.trust],
         findings=findings,
         taken_back=dict(loop.taken_back),
         not_excited=tuple(hidden),
@@ -97,6 +112,19 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
         notices=tuple(notice for run in runs for notice in run.notices),
         model=_saved(loop, runs, parameters, after, sigmas),
     )
+
+
+def _more_trusted(loop: Loop, runs: Sequence[Aligned], options: CalibrationOptions) -> Loop:
+    """Of two trusts in the details, that whose model drifts clearly less on data that it was not fitted to.
+
+    Asked for only where the stretches of the log contradict the model and its noise: details are wrong there in ways
+    that no noise describes, and constants fitted to them are worse than those that the whole path shows.
+    """
+    other = run_loop(runs, options.filter, options.heading_rate_hz, Trust.PATH)
+    here, there = (judge(one.model, options.outage_window_s).outage_end_rms_m for one in (loop, other))
+    if here is None or there is None:
+        return loop
+    return other if there < CLEARLY_LESS * here else loop
 
 
 def _chance(loop: Loop, dressed: Sequence[Aligned], nonsense: Sequence[NonsenseColumn]) -> Placebo:

@@ -7,7 +7,7 @@ all candidates free beside the noise  →  evidence of every subset  →  the ch
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from sccal.diagnose.shapes import Found, best_forms, find_moments, refined
 from sccal.effects.effect import Parameter
 from sccal.evidence.candidates import Candidates, gather_candidates
 from sccal.evidence.extension import Free
-from sccal.evidence.held_out_gain import held_out_gain
+from sccal.evidence.held_out_gain import WHOLE_RUNS, held_out_gain
 from sccal.evidence.joint import Key
-from sccal.evidence.model import Accepted, Model, bare_model, refitted
+from sccal.evidence.model import Accepted, Model, Trust, bare_model, refitted
 from sccal.evidence.parallel import each
 from sccal.evidence.posterior import Posterior
 from sccal.evidence.saturated import Saturated, saturate
@@ -79,14 +79,21 @@ class Loop:
         return [one.key for one in self.model.accepted]
 
 
-def run_loop(runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: float) -> Loop:
+def run_loop(
+    runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: float, trust: Trust = Trust.DETAIL
+) -> Loop:
     """Find what the model lacks in some runs of one vehicle.
+
+    Where details are not trusted and whole runs judge, what a run has alone says nothing to the judge (a clock of its
+    own fits every run's details), and neither does a moment: there, only what the vehicle has competes.
 
     Raises:
         DataError: where a run hardly moves.
     """
-    first = bare_model(runs, options, heading_rate_hz)
+    first = bare_model(runs, options, heading_rate_hz, trust)
     candidates = gather_candidates([first.view(k) for k in range(len(runs))])
+    if trust is Trust.PATH and len(runs) >= WHOLE_RUNS:
+        candidates = replace(candidates, free=tuple(one for one in candidates.free if _of_vehicle(one)))
     competing = best_forms(first, candidates, ())
     saturated = saturate(first, competing, _prices(competing), Reach.FEW)
     loop = Loop(first, first, candidates, saturated)
@@ -107,6 +114,10 @@ def run_loop(runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: f
         loop.model = _refitted(loop, _chosen(loop, competing))
     _take_back(loop)
     return loop
+
+
+def _of_vehicle(free: Free) -> bool:
+    return all(one.scope == "vehicle" for one in free.parameters)
 
 
 def _prices(competing: Sequence[Accepted]) -> dict[str, float]:
@@ -156,7 +167,7 @@ def _with_shapes(loop: Loop, kept: list[Accepted]) -> tuple[list[Accepted], list
         else:
             new.append(one)
     keys = frozenset(one.key for one in new)
-    if keys == loop.looked_beside:
+    if keys == loop.looked_beside or loop.model.trust is Trust.PATH:
         return new, []
     loop.looked_beside = keys
     known = [one.free.effect.name for one in loop.moments]

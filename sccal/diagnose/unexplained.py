@@ -38,7 +38,7 @@ def unexplained(loop: Loop) -> Unexplained:
     if gains[best] < PATTERN_NATS or float(np.abs(mean[mine]).max()) < least:
         return Unexplained(False)
     values = mean[mine] * posterior.sigma[posterior.rows[best]]
-    fraction, size = variance_fraction(loop.model, pattern, values)
+    fraction, size = variance_fraction(full.model, pattern, values)
     t = float(np.sqrt(max(float(mean[mine] @ np.linalg.solve(covariance[np.ix_(mine, mine)], mean[mine])), 0.0)))
     return Unexplained(
         significant=True,
@@ -54,8 +54,8 @@ def unexplained(loop: Loop) -> Unexplained:
 def variance_fraction(model: Model, pattern: Pattern, values: Floats) -> tuple[float, str]:
     """Share of the error's variance at the pattern's port that follows it, and its size in words.
 
-    ``values`` are the pattern's parameters. At the motion the errors are sums over WINDOW_S, since one step says
-    nothing.
+    The model holds the pattern, so that its noise has not swallowed it. ``values`` are the pattern's parameters. At the
+    motion the errors are sums over WINDOW_S, since one step says nothing.
     """
     explained, noise, most = [], [], 0.0
     own = values.tolist()

@@ -14,6 +14,7 @@ from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.ground import HILLS
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -28,6 +29,10 @@ class AntennaHeight(Effect):
     excited_by = "drive up, down and across a slope of 5° or more, with an AHRS that logs pitch and roll"
     reference = "NovAtel OEM7 documentation, Terrain Compensation; Bell, Comput. Electron. Agric. 2000, 25, 53"
     shown_against = "pitch"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        where = f"{size(found['m'])} m {'above' if found['m'].value > 0.0 else 'below'} the ground"
+        return f"the antenna stands {where}, and swings out where the robot pitches and rolls"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, amplitude, moment
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -32,6 +33,10 @@ class BaseShift(Effect):
     reference = "RTCM 10403, messages 1005 and 1006: coordinates of the reference station"
     search = "moment"
     suspect_stream = "fixes"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        jump = amplitude(found["east_m"], found["north_m"])
+        return f"all fixes jump by {jump} m {moment(found['at_s'])}"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         after = np.where(drive.fixes.t_s - drive.start_s > at["at_s"], 1.0, 0.0)

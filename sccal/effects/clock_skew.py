@@ -19,6 +19,7 @@ from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.gnss_latency import TRANSPORT_S, late_fix
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, size
 from sccal.simulate.physics import Physics, Sensor
 
 _PER_PPM = 1e-6
@@ -33,6 +34,10 @@ class ClockSkew(Effect):
     looks_like = "fixes lag behind the path, or run ahead of it, in proportion to speed and more with every minute"
     excited_by = "drive for longer, keep moving, and stop or reverse 10 m now and then up to the end"
     reference = "Moon, Skelly and Towsley 1999, Estimation and removal of clock skew from network delay measurements"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        way = "fast" if found["ppm"].value > 0.0 else "slow"
+        return f"the fixes' clock runs {size(found['ppm'])} ppm {way} against the wheels'"
 
     def hidden_sigma(self, parameter: Parameter, duration_s: float) -> float:
         """A transport time that changes over a run passes for a skew of that change over the run's length."""

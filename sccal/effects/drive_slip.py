@@ -13,6 +13,7 @@ import numpy as np
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.rims import speeding_up_mps2, stretch_along
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, less, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -27,6 +28,10 @@ class DriveSlip(Effect):
     excited_by = "speed up hard as well as gently, to more than one speed"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"
     shown_against = "acceleration"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        rate = found["per_mps2"]
+        return f"the robot travels {percent(rate)} {less(rate)} than its wheels say for each m/s² of speeding up"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

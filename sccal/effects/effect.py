@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sccal.arrays import Floats
+from sccal.effects.drive_shape import DriveShape
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured
 from sccal.simulate.physics import Physics
 
 MotionPort = Literal["along", "side", "turn", "right_wheel", "left_wheel"]
@@ -89,6 +91,18 @@ class Effect(ABC):
     """How its shapes are found: a size on a grid and refined, a moment of the run, a place; none where it has none."""
     suspect_stream: Stream = "motion"
     """Of a moment or a place: the measurements whose innovations are large there."""
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        """What a machine with these values does, as a clause of a sentence: "the wheels read 0.04 m/s too fast".
+
+        ``found`` holds finite values, of all parameters but shapes with a default, which may be missing. The title
+        where no words say more.
+        """
+        return self.title
+
+    def shown_by(self, drive: DriveShape) -> bool | None:
+        """Whether a drive of this shape would show it, by a rule of thumb; None where there is no such rule."""
+        return None
 
     def hidden_sigma(self, parameter: Parameter, duration_s: float) -> float:
         """Part of a parameter's uncertainty that no run of that length shows, in file units."""

@@ -17,8 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Floats
+from sccal.effects.drive_shape import DriveShape, two_speeds
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import SMOOTH_S, DriveView, Steps
+from sccal.effects.words import Measured, size
 from sccal.simulate.physics import Physics, Sensor
 
 
@@ -61,6 +63,13 @@ class GnssLatency(Effect):
     excited_by = "drive at a second speed, or reverse 10 m: at one speed it is the same as a forward lever arm"
     reference = "Skog and Händel 2011, Time synchronization errors in loosely coupled GPS-aided inertial navigation"
     shown_against = "speed"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        when = "before" if found["s"].value > 0.0 else "after"
+        return f"the fixes show where the antenna was {size(found['s'])} s {when} their stamp"
+
+    def shown_by(self, drive: DriveShape) -> bool:
+        return two_speeds(drive)
 
     def fix_delay_s(self, drive: DriveView, at: Mapping[str, float]) -> Floats:
         return np.full(drive.fixes.t_s.size, at["s"])

@@ -20,8 +20,10 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.effects.compass import TAU, let_in, of_tau, slow_deviation_columns, tried_taus
+from sccal.effects.drive_shape import DriveShape, all_round
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, amplitude
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -41,6 +43,13 @@ class HardIron(Effect):
     reference = "NGA Pub. 226, Handbook of Magnetic Compass Adjustment: coefficients B and C"
     shown_against = "heading"
     search = "scale"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        most = amplitude(found["cos_deg"], found["sin_deg"])
+        return f"magnetised parts near the compass turn it by up to {most} deg, once per full turn"
+
+    def shown_by(self, drive: DriveShape) -> bool:
+        return all_round(drive)
 
     def shape_grid(self, drive: DriveView) -> tuple[Mapping[str, float], ...]:
         """Time constants that the drive is long enough for."""

@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, sense, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -26,6 +27,10 @@ class HeadingDrift(Effect):
     looks_like = "the heading offset of the first minutes differs from that of the last; in between it moves evenly"
     excited_by = "drive for longer, with straights of 20 m in two directions at the beginning and at the end"
     reference = "Titterton and Weston 2004, Strapdown Inertial Navigation Technology: gyroscope bias"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        rate = found["deg_per_hour"]
+        return f"the AHRS heading drifts by {size(rate)} deg an hour {sense(rate)}"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         return (Column("deg_per_hour", "heading", np.radians((drive.headings.t_s - drive.start_s) / 3600.0)),)

@@ -15,6 +15,7 @@ from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.gnss_latency import mean_rates
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, size
 from sccal.simulate.physics import Physics, Sensor
 
 
@@ -28,6 +29,10 @@ class HeadingLatency(Effect):
     excited_by = "spin in place both ways, at two turn rates"
     reference = "Kelly and Sukhatme 2014, A general framework for temporal calibration of multiple sensors"
     shown_against = "turn_rate"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        when = "before" if found["s"].value > 0.0 else "after"
+        return f"the AHRS readings show the heading of {size(found['s'])} s {when} their stamp"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         _, turn_rate = mean_rates(drive.steps, drive.headings.t_s, at["s"])

@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -26,6 +27,10 @@ class HeadingScale(Effect):
     looks_like = "the heading offset runs away with every turn to one side, and comes back with turns to the other"
     excited_by = "turn many times to one side, with straights of 20 m before and after: circles, or spins in place"
     reference = "Titterton and Weston 2004, Strapdown Inertial Navigation Technology: gyroscope scale factor"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        far = "further" if found["ratio"].value > 0.0 else "less"
+        return f"the AHRS reading turns {percent(found['ratio'])} {far} than the robot"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         yaw = drive.headings.yaw_rad

@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, moment, sense, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -31,6 +32,10 @@ class HeadingStep(Effect):
     reference = "Basseville and Nikiforov 1993, Detection of Abrupt Changes: additive jump of a mean"
     search = "moment"
     suspect_stream = "headings"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        jump = found["deg"]
+        return f"the AHRS heading jumps by {size(jump)} deg {sense(jump)} {moment(found['at_s'])}"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         after = drive.headings.t_s - drive.start_s > at["at_s"]

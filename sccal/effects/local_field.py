@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, rounded, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -34,6 +35,12 @@ class LocalField(Effect):
     shown_against = "east"
     search = "place"
     suspect_stream = "headings"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        east, north = rounded(found["east_m"].value), rounded(found["north_m"].value)
+        place = f"within about {size(found['radius_m'])} m of one place"
+        where = f"({east} m east, {north} m north of the run's origin)"
+        return f"{place} {where} the compass is turned by up to {size(found['deg'])} deg"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         seen = drive.headings

@@ -18,6 +18,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, percent, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -50,6 +51,9 @@ class MissedLeft(Effect):
     shown_against = "speed"
     search = "scale"
 
+    def says(self, found: Mapping[str, Measured]) -> str:
+        return f"the left wheel's counter {_in_words(found)}"
+
     def shape_grid(self, drive: DriveView) -> tuple[Mapping[str, float], ...]:
         """Rates between the left wheel's slower and its faster ones."""
         return tuple({"above_radps": one} for one in limits_radps(drive.steps.left_rate_radps, drive.steps.left_m))
@@ -75,6 +79,9 @@ class MissedRight(Effect):
     shown_against = "speed"
     search = "scale"
 
+    def says(self, found: Mapping[str, Measured]) -> str:
+        return f"the right wheel's counter {_in_words(found)}"
+
     def shape_grid(self, drive: DriveView) -> tuple[Mapping[str, float], ...]:
         """Rates between the right wheel's slower and its faster ones."""
         return tuple({"above_radps": one} for one in limits_radps(drive.steps.right_rate_radps, drive.steps.right_m))
@@ -84,6 +91,12 @@ class MissedRight(Effect):
 
     def physics(self, values: Mapping[str, float]) -> Physics:
         return _Losing("right", values["ratio"], values.get("above_radps", 0.0))
+
+
+def _in_words(found: Mapping[str, Measured]) -> str:
+    ratio, above = found["ratio"], found["above_radps"]
+    fast = f" above {size(above)} rad/s" if above.value > 0.0 else ""
+    return f"{'loses' if ratio.value > 0.0 else 'adds'} {percent(ratio)} of its counts{fast}"
 
 
 def lost_m(counted_m: Floats, rate_radps: Floats, at: Mapping[str, float]) -> Floats:

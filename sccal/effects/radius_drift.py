@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -30,6 +31,10 @@ class RadiusDrift(Effect):
         "drive for half an hour or more at the same mix of speeds, repeating one straight at the start and the end"
     )
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change while driving"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        grow = "grow" if found["per_hour"].value > 0.0 else "shrink"
+        return f"both wheels' radii {grow} by {percent(found['per_hour'])} an hour"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

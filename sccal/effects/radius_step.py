@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, moment, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -31,6 +32,10 @@ class RadiusStep(Effect):
     reference = "loaded against unloaded wheel radius; geometry"
     search = "moment"
     suspect_stream = "motion"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        grow = "grow" if found["ratio"].value > 0.0 else "shrink"
+        return f"both wheels' radii {grow} by {percent(found['ratio'])} {moment(found['at_s'])}"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

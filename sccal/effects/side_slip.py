@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from sccal.effects.drive_shape import DriveShape, both_ways, spins, two_speeds
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import BodySteps
 
@@ -31,6 +33,13 @@ class SideSlip(Effect):
         "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014; lateral dynamics of cars for the term v ω"
     )
     shown_against = "turn_rate"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        way = "outwards" if found["s"].value > 0.0 else "inwards"
+        return f"the robot slides {way} in turns, at {size(found['s'])} m/s for each m/s² of sideways acceleration"
+
+    def shown_by(self, drive: DriveShape) -> bool:
+        return spins(drive) and both_ways(drive) and two_speeds(drive)
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

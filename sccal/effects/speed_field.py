@@ -13,6 +13,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, sense, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
@@ -27,6 +28,10 @@ class SpeedField(Effect):
     excited_by = "drive at a second speed, stop now and then, and reverse 10 m"
     reference = "Ozyagcilar, NXP AN4247, Layout recommendations for PCBs using a magnetometer: fields of currents"
     shown_against = "speed"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        rate = found["deg_per_mps"]
+        return f"the motors' field turns the compass by {size(rate)} deg {sense(rate)} for each m/s of speed"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         return (Column("deg_per_mps", "heading", np.radians(drive.headings.speed_mps)),)

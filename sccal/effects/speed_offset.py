@@ -14,6 +14,7 @@ from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.rims import speed_mps
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, size
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -40,6 +41,10 @@ class SpeedOffset(Effect):
     excited_by = "drive the same straight slowly and fast: at one speed it is the same as smaller wheels"
     reference = "UN Regulation No. 39: a speedometer may read too fast by a tenth and by 4 km/h, and never too slow"
     shown_against = "speed"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        pace = "fast" if found["mps"].value > 0.0 else "slow"
+        return f"the wheels read {size(found['mps'])} m/s too {pace} while the robot moves"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         return (Column("mps", "along", -way(drive.steps.speed_mps, at["mps"]) * drive.steps.dt_s),)

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sccal.effects.drive_shape import DriveShape, much_faster
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.rims import loss_solved, speed_mps, stretch_along
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, less, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -27,6 +29,13 @@ class SpeedSlip(Effect):
     excited_by = "drive at a second speed: the same kind of straight, slow and fast"
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change with the driving state"
     shown_against = "speed"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        rate = found["per_mps"]
+        return f"the robot travels {percent(rate)} {less(rate)} than its wheels say for each m/s of speed"
+
+    def shown_by(self, drive: DriveShape) -> bool:
+        return much_faster(drive)
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

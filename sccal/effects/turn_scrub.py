@@ -13,6 +13,7 @@ import numpy as np
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.rims import stretch_along, turn_rate_radps
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, less, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -29,6 +30,10 @@ class TurnScrub(Effect):
     excited_by = "drive tight arcs as well as straights, both ways and at two turn rates"
     reference = "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014, on skid-steered turning"
     shown_against = "turn_rate"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        rate = found["per_radps"]
+        return f"the robot travels {percent(rate)} {less(rate)} than its wheels say for each rad/s of turn rate"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

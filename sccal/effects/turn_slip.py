@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sccal.effects.drive_shape import SOME, DriveShape, both_ways, spins
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.rims import loss_solved, stretch_turn, turn_rate_radps
 from sccal.effects.view import DriveView
+from sccal.effects.words import Measured, less, percent
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -27,6 +29,13 @@ class TurnSlip(Effect):
     excited_by = "turn at two clearly different rates, both ways: slow arcs and fast spins in place"
     reference = "Pentzer, Brennan and Reichard, Journal of Field Robotics 2014, on skid-steered turning"
     shown_against = "turn_rate"
+
+    def says(self, found: Mapping[str, Measured]) -> str:
+        rate = found["per_radps"]
+        return f"the robot turns {percent(rate)} {less(rate, 'more')} than its wheels say for each rad/s of turn rate"
+
+    def shown_by(self, drive: DriveShape) -> bool:
+        return spins(drive) and drive.arcs >= SOME and both_ways(drive)
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

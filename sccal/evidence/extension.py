@@ -79,14 +79,7 @@ class FreeEffects:
 
         Raises UsageError for unknown ones, and for those that need a search; DataError where the log lacks the column.
         """
-        effects = tuple(Free(effect_by_name(name, aligned)) for name in dict.fromkeys(names))
-        for free in effects:
-            shapes = [parameter.name for parameter in free.effect.parameters if parameter.shape]
-            if shapes:
-                raise UsageError(
-                    f"effect {free.effect.name}: its {', '.join(shapes)} must be searched for, not filtered: "
-                    "`sccal diagnose` does"
-                )
+        effects = tuple(_as_named(effect_by_name(name, aligned)) for name in dict.fromkeys(names))
         return cls(effects) if effects else None
 
     @property
@@ -193,6 +186,16 @@ def _turned_back(placed: Sequence[Placed], turned_rad: Floats) -> list[Placed]:
 def view_run(problem: RunProblem, at: At, clear: tuple[Floats, Floats] | None) -> DriveView:
     """The drive as columns see it, along the given path."""
     return view_drive(problem.aligned, problem.timeline, _belief(problem, at), clear)
+
+
+def _as_named(effect: Effect) -> Free:
+    """An effect with its shapes where they usually are. Raises UsageError where a shape has to be searched for."""
+    lacking = [one.name for one in effect.parameters if one.shape and one.default is None]
+    if lacking:
+        raise UsageError(
+            f"effect {effect.name}: its {', '.join(lacking)} must be searched for, not filtered: `sccal diagnose` does"
+        )
+    return Free(effect, {one.name: float(one.default) for one in effect.parameters if one.default is not None})
 
 
 def effect_by_name(name: str, aligned: Aligned | None) -> Effect:

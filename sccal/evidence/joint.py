@@ -215,6 +215,20 @@ class JointFit:
         shared = [_marginal(one, rows, k, self.prior) for one, rows in zip(self.runs, self.places.of_run, strict=True)]
         return disagreement(shared, self.mode, self.prior[:k, :k])
 
+    @cached_property
+    def misfit(self) -> float:
+        """χ² per degree of freedom of the stretches' scores: 1 where noise and model are right, however many runs."""
+        chi2, directions = 0.0, 0
+        for one, rows in zip(self.runs, self.places.of_run, strict=True):
+            scale = 1.0 / np.sqrt(np.diag(self.prior)[rows])
+            for stretch in one.stretches:
+                score = scale * (stretch.vector - stretch.precision @ self.values[rows])
+                values, vectors = np.linalg.eigh(stretch.precision * np.outer(scale, scale))
+                seen = values > 1.0
+                chi2 += float(((vectors.T @ score)[seen] ** 2 / values[seen]).sum())
+                directions += int(seen.sum())
+        return chi2 / max(directions, 1)
+
     @property
     def nll(self) -> float:
         """Negative log-likelihood of all runs."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
 
@@ -16,7 +17,15 @@ from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, iterate
 from sccal.filter.levels import Noise
-from sccal.filter.noise import COARSE_HZ, PATH_HZ, Reach, estimate_noise
+from sccal.filter.noise import (
+    COARSE_HZ,
+    MISFIT,
+    PATH_HZ,
+    Reach,
+    estimate_noise,
+    misfit_noise,
+    misfit_timeline,
+)
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, find_start
 
@@ -25,6 +34,20 @@ FIX_RATE_HZ = 5.0
 WHEEL_RATE_HZ = 20.0
 ROUNDS = 6
 ROUNDS_BEFORE = 2
+
+
+class Trust(Enum):
+    """How far the details of the measurements are trusted."""
+
+    DETAIL = "detail"
+    """Noise as the innovations have it, from one reading to the next."""
+    PATH = "path"
+    """Nothing wanders: all misfit is white, and the whole path counts (see sccal.filter.noise.misfit_noise)."""
+
+
+def trust_in(noise: Noise) -> Trust:
+    """The trust under which a noise was estimated."""
+    return Trust.PATH if noise.source == MISFIT else Trust.DETAIL
 
 
 @dataclass(frozen=True)
@@ -48,6 +71,7 @@ class Model:
     problems: tuple[RunProblem, ...]
     fit: JointFit
     heading_rate_hz: float
+    trust: Trust
 
     @property
     def nll(self) -> float:
@@ -73,8 +97,10 @@ class Model:
         return dict(zip(names_of(self.problems[run]), self.fit.each[run][3:].tolist(), strict=True))
 
 
-def timeline_of(aligned: Aligned, heading_rate_hz: float) -> Timeline:
+def timeline_of(aligned: Aligned, heading_rate_hz: float, trust: Trust) -> Timeline:
     """Events for a diagnosis: what its slowest candidate needs, and no more."""
+    if trust is Trust.PATH:
+        return misfit_timeline(aligned)
     return build_timeline(aligned, OUTPUT_RATE_HZ, heading_rate_hz, FIX_RATE_HZ, wheel_rate_hz=WHEEL_RATE_HZ)
 
 
@@ -91,10 +117,13 @@ def model_of(
 
     The events are those of a diagnosis, or the few of a quick look.
     """
+    trust = trust_in(problems[0].noise)
     ready = [
         replace(
             problem,
-            timeline=thinned_timeline_of(problem.aligned) if thinned else timeline_of(problem.aligned, heading_rate_hz),
+            timeline=thinned_timeline_of(problem.aligned)
+            if thinned
+            else timeline_of(problem.aligned, heading_rate_hz, trust),
             options=replace(problem.options, soft_gate=True),
         )
         for problem in problems
@@ -111,7 +140,7 @@ def model_of(
         else:
             everywhere += [Accepted(free, run) for free, run in some]
     fit = fit_jointly(ready, starts, ROUNDS, with_stretches=True)
-    return Model(tuple(everywhere), tuple(ready), fit, heading_rate_hz)
+    return Model(tuple(everywhere), tuple(ready), fit, heading_rate_hz, trust)
 
 
 def extension_of(accepted: Sequence[Accepted], run: int) -> FreeEffects | None:
@@ -120,7 +149,9 @@ def extension_of(accepted: Sequence[Accepted], run: int) -> FreeEffects | None:
     return FreeEffects(mine) if mine else None
 
 
-def bare_model(runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: float) -> Model:
+def bare_model(
+    runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz: float, trust: Trust = Trust.DETAIL
+) -> Model:
     """The paper's model alone, its noise searched for over the whole prior.
 
     Raises:
@@ -130,15 +161,18 @@ def bare_model(runs: Sequence[Aligned], options: FilterOptions, heading_rate_hz:
 
     def prepared(aligned: Aligned) -> tuple[RunProblem, At]:
         start = find_start(aligned)
-        noise, _ = estimate_noise(aligned, start, options, heading_rate_hz)
-        problem = RunProblem(aligned, timeline_of(aligned, heading_rate_hz), start, noise, soft)
+        if trust is Trust.PATH:
+            noise, _ = misfit_noise(aligned, start, options)
+        else:
+            noise, _ = estimate_noise(aligned, start, options, heading_rate_hz)
+        problem = RunProblem(aligned, timeline_of(aligned, heading_rate_hz, trust), start, noise, soft)
         values, found = iterate(problem, problem.at_centre())
         return problem, At(Constants.of(values), values[4:], found)
 
     ready = each(prepared, runs)
     problems = [problem for problem, _ in ready]
     fit = fit_jointly(problems, [first for _, first in ready], ROUNDS, with_stretches=True)
-    return Model((), tuple(problems), fit, heading_rate_hz)
+    return Model((), tuple(problems), fit, heading_rate_hz, trust)
 
 
 def refitted(
@@ -176,16 +210,7 @@ def refitted(
             # Under the noise of a model that lacks the effects they come near, so that the search starts from there.
             values, found = iterate(problem, first, ROUNDS_BEFORE, with_sigmas=False)
             first = At(Constants.of(values), values[4:], found)
-            noise, settled = estimate_noise(
-                before.aligned,
-                before.start,
-                before.options,
-                model.heading_rate_hz,
-                extension,
-                first,
-                [problem.noise, before.noise],
-                reach,
-            )
+            noise, settled = _noise(model, before, extension, first, [problem.noise, before.noise], reach)
             problem = replace(problem, noise=noise)
             # The path over the whole run: the search saw a stretch of it.
             first = At(settled.constants, settled.values, first.path)
@@ -194,7 +219,23 @@ def refitted(
     ready = each(prepared, range(len(model.problems)))
     problems = [problem for problem, _ in ready]
     fit = fit_jointly(problems, [first for _, first in ready], rounds, with_stretches=True)
-    return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz)
+    return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz, model.trust)
+
+
+def _noise(
+    model: Model,
+    problem: RunProblem,
+    extension: FreeEffects | None,
+    first: At,
+    near: Sequence[Noise],
+    reach: Reach,
+) -> tuple[Noise, At]:
+    """A run's noise beside some effects, under the model's trust."""
+    if model.trust is Trust.PATH:
+        return misfit_noise(problem.aligned, problem.start, problem.options, extension, first)
+    return estimate_noise(
+        problem.aligned, problem.start, problem.options, model.heading_rate_hz, extension, first, near, reach
+    )
 
 
 def _carried(model: Model, run: int, extension: FreeEffects | None) -> At:

@@ -38,11 +38,11 @@ COARSE_HZ = (2.0, 1.0, 5.0)
 """Headings, fixes and wheels of the thinned log."""
 PATH_HZ = 2.0
 """Of the path, along which effects of the heading are laid out."""
-FINE_FIX_HZ, FINE_WHEEL_HZ = 5.0, 20.0
-POINTS = 96
+FINE_FIX_HZ, FINE_WHEEL_HZ = 5.0, 10.0
+POINTS = 64
 SPREAD = 1.4
 """Of the points, in widths of the prior: they reach into its tails, where the odd log is."""
-MOST_CLIMBS = 6
+MOST_CLIMBS = 4
 TOGETHER_NATS = 1.0
 """Ends of two climbs that are nearer than this are one."""
 ROUNDS = 3
@@ -51,9 +51,15 @@ DIFFERENCE, CURVATURE_STEP = 0.01, 0.05
 LEAST_CURVATURE = 0.25
 """That of a prior of width two, the widest in the table."""
 MOST_STEPS, LONGEST_STEP, SETTLED_NATS = 25, 1.5, 0.1
-SHARES = (1.0, 0.4)
+SHARES = (1.0, 0.5, 0.2, 0.05)
 """Of a step, tried at once."""
-MOST_FAILURES = 3
+MISFIT = "misfit"
+"""Where a noise comes from, that of misfit_noise."""
+MISFIT_HZ, MISFIT_PATH_HZ = (2.0, 1.0, 20.0), 5.0
+MISFIT_HEADING_RAD = float(np.radians(0.2))
+MISFIT_FIX_M, MISFIT_SLIP, MISFIT_ROUNDS = 2.0, 0.01, 6
+STILL = 1e-5
+"""Level of a noise that is switched off."""
 NORMAL_MAD = 1.4826
 DEFAULT_COLOURED_TAU_S = 30.0
 
@@ -77,6 +83,8 @@ class End:
     cost: float
     logs: Floats
     at: At
+    inverse: Floats
+    """Of the curvature there, as far as the climb found it: where another climb may begin."""
 
 
 def estimate_noise(
@@ -122,8 +130,38 @@ def estimate_noise(
         found = search.climbed(fine if reach is Reach.NEAR else coarse, known[0], rough)
         return search.noise(found.logs), found.at
     best, apart = search.top(coarse, known, rough, reach)
-    found = search.climbed(fine, best.logs, best.at)
+    found = search.climbed(fine, best.logs, best.at, best.inverse)
     return replace(search.noise(found.logs), apart_nats=apart), found.at
+
+
+def misfit_noise(
+    aligned: Aligned, start: Start, options: FilterOptions, extension: Extension | None = None, first: At | None = None
+) -> tuple[Noise, At]:
+    """The noise of a log whose details are not to be trusted: all misfit white, at the level at which it is found.
+
+    Nothing wanders. Fixes, one a second, and wheels are trusted as far as the whole path, laid out along the heading,
+    meets them, so that what the model lacks stays visible as misfit of the path instead of passing for slow errors.
+    """
+    timeline = misfit_timeline(aligned)
+    stated_m = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
+    fix_m, slip, at = MISFIT_FIX_M, MISFIT_SLIP, first
+    for _ in range(MISFIT_ROUNDS):
+        noise = Noise(MISFIT_HEADING_RAD, STILL, 20.0, fix_m / stated_m, STILL, 40.0, slip, MISFIT, {}, stated_m)
+        problem = RunProblem(aligned, timeline, start, noise, replace(options, soft_gate=True), extension)
+        values, found = iterate(problem, problem.at_centre() if at is None else at, 3, with_sigmas=False)
+        at = At(Constants.of(values), values[4:], found)
+        fix_nis = float(np.mean(found.fix_nu_m**2 / found.fix_var_m2[:, :2]))
+        heading_nis = float(np.mean(found.heading_nu_rad**2 / found.heading_var_rad2))
+        fix_m = float(np.clip(fix_m * np.sqrt(fix_nis), stated_m, 50.0))
+        slip = float(np.clip(slip * np.sqrt(heading_nis), 0.001, 0.2))
+    assert at is not None
+    return noise, at
+
+
+def misfit_timeline(aligned: Aligned) -> Timeline:
+    """The events under that noise."""
+    heading_hz, fix_hz, wheel_hz = MISFIT_HZ
+    return build_timeline(aligned, MISFIT_PATH_HZ, heading_hz, fix_hz, wheel_rate_hz=wheel_hz)
 
 
 @dataclass(frozen=True)
@@ -157,8 +195,9 @@ class Search:
         still = self.start.moving_from_s - begin
         stretch = (begin, (self.start.moving_from_s if still > 0.25 * STRETCH_S else begin) + STRETCH_S)
         heading_hz, fix_hz, wheel_hz = COARSE_HZ
-        coarse = build_timeline(self.aligned, PATH_HZ, min(heading_hz, heading_rate_hz), fix_hz, stretch, wheel_hz)
-        return coarse, build_timeline(self.aligned, PATH_HZ, heading_rate_hz, FINE_FIX_HZ, stretch, FINE_WHEEL_HZ)
+        path_hz = PATH_HZ if self.extension is not None else 0.01
+        coarse = build_timeline(self.aligned, path_hz, min(heading_hz, heading_rate_hz), fix_hz, stretch, wheel_hz)
+        return coarse, build_timeline(self.aligned, path_hz, heading_rate_hz, FINE_FIX_HZ, stretch, FINE_WHEEL_HZ)
 
     def noise(self, logs: Floats) -> Noise:
         """The levels as the filter takes them."""
@@ -191,18 +230,19 @@ class Search:
                 break
         return ends[0], ends[1].cost - ends[0].cost
 
-    def climbed(self, timeline: Timeline, logs: Floats, at: At) -> End:
+    def climbed(self, timeline: Timeline, logs: Floats, at: At, inverse: Floats | None = None) -> End:
         """From a point to the top of its hill: levels and constants in turns."""
         cost, at = self.settled(timeline, logs, at)
         for _ in range(ROUNDS):
-            climbed = self._climb(timeline, logs, at)
+            climbed, inverse = self._climb(timeline, logs, at, inverse)
             before = cost
             settled, there = self.settled(timeline, climbed, at)
             if settled < cost:
                 cost, logs, at = settled, climbed, there
             if cost > before - 0.5 * TOGETHER_NATS:
                 break
-        return End(cost, logs, at)
+        assert inverse is not None
+        return End(cost, logs, at, inverse)
 
     def settled(self, timeline: Timeline, logs: Floats, at: At) -> tuple[float, At]:
         """Cost at given noise with the constants fitted to it, and these."""
@@ -218,17 +258,17 @@ class Search:
         """Negative log-posterior of some levels, the constants and effects marginalised about where they are."""
         return self._cost_at(timeline, logs, at)(logs)
 
-    def _climb(self, timeline: Timeline, logs: Floats, at: At) -> Floats:
-        """The most likely levels from a point, the linearisation fixed."""
+    def _climb(self, timeline: Timeline, logs: Floats, at: At, inverse: Floats | None) -> tuple[Floats, Floats]:
+        """The most likely levels from a point, the linearisation fixed, and the inverse curvature there."""
         free = self.levels.free
-        whole = self._cost_at(timeline, logs, at)
+        cost_of = self._cost_at(timeline, logs, at)
         with at_once() as map_at_once:
 
             def costs(points: Sequence[Floats]) -> Floats:
-                return np.array(list(map_at_once(lambda point: whole(_with(logs, free, point)), list(points))))
+                return np.array(list(map_at_once(lambda point: cost_of(_with(logs, free, point)), list(points))))
 
-            found = descend(costs, logs[free], self.levels.low[free], self.levels.high[free])
-        return _with(logs, free, found)
+            found, inverse = descend(costs, logs[free], self.levels.low[free], self.levels.high[free], inverse)
+        return _with(logs, free, found), inverse
 
     def _cost_at(self, timeline: Timeline, logs: Floats, at: At) -> Callable[[Floats], float]:
         """Cost of any levels, the linearisation and all that depends on it computed once."""
@@ -245,51 +285,88 @@ class Search:
         return cost
 
 
-def descend(costs: Callable[[Sequence[Floats]], Floats], start: Floats, low: Floats, high: Floats) -> Floats:
-    """The least of a smooth function within bounds (k,), by a quasi-Newton method (BFGS; Nocedal and Wright 2006, 6.1).
+def descend(
+    costs: Callable[[Sequence[Floats]], Floats],
+    start: Floats,
+    low: Floats,
+    high: Floats,
+    inverse: Floats | None = None,
+) -> tuple[Floats, Floats]:
+    """The least of a smooth function within bounds, by a quasi-Newton method (BFGS; Nocedal and Wright 2006, 6.1).
 
-    ``costs`` evaluates several points at once, which is what several cores are good for. The curvatures along the axes,
-    by second differences, begin the matrix: they differ by a factor of a thousand between levels that thousands of
-    readings show and levels that the prior holds.
+    Parameters
+    ----------
+    costs
+        Evaluates several points (k,) at once, which is what several cores are good for.
+    start, low, high
+        (k,) where to begin, and the bounds.
+    inverse
+        (k, k) inverse curvature near the start, where one is known. Without it second differences along the axes begin
+        the matrix: levels that thousands of readings show and levels that the prior holds differ by a factor of a
+        thousand.
+
+    Returns
+    -------
+    tuple
+        The point (k,), and the inverse curvature there as far as it was found.
     """
-    here, k = np.clip(start, low, high), start.size
-    inside = np.clip(here, low + CURVATURE_STEP, high - CURVATURE_STEP)
-    sides = costs([inside, *(inside + CURVATURE_STEP * one for one in np.vstack((np.eye(k), -np.eye(k))))])
-    middle, up, down = sides[0], sides[1 : k + 1], sides[k + 1 :]
-    curvature = np.maximum((up - 2.0 * middle + down) / CURVATURE_STEP**2, LEAST_CURVATURE)
-    here, cost, slope = inside, middle, (up - down) / (2.0 * CURVATURE_STEP)
-    inverse = np.diag(1.0 / curvature)
-    failures = 0
+    here = np.clip(start, low, high)
+    cost, slope, fresh = np.inf, np.zeros(start.size), False
+    if inverse is not None:
+        cost, slope = _slope(costs, here, high)
     for _ in range(MOST_STEPS):
+        if inverse is None:
+            here, cost, slope, inverse = _curved(costs, here, low, high)
+            fresh = True
         held = ((here <= low) & (slope > 0.0)) | ((here >= high) & (slope < 0.0))
         step = np.where(held, 0.0, -inverse @ np.where(held, 0.0, slope))
         step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-        expected = -float(slope @ step)
-        if expected < SETTLED_NATS:
+        if -float(slope @ step) < SETTLED_NATS:
             break
         points = [np.clip(here + share * step, low, high) for share in SHARES]
         tried = costs(points)
         best = int(np.argmin(tried))
         if not tried[best] < cost:
-            # The matrix promises what the function does not hold: begin anew with a sixteenth of the first step.
-            failures += 1
-            if failures > MOST_FAILURES:
+            if fresh:
                 break
-            inverse = np.diag(1.0 / curvature) / 16.0**failures
+            inverse = None  # it promises what the function does not hold: by differences anew
             continue
-        moved = points[best] - here
-        gained, here, cost = cost - tried[best], points[best], float(tried[best])
-        signs = np.where(here + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
-        beside = costs([here + sign * one for sign, one in zip(signs, np.eye(k), strict=True)])
-        turned = (beside - cost) / signs - slope
-        slope = slope + turned
+        moved, before = points[best] - here, slope
+        here, fresh = points[best], False
+        cost, slope = _slope(costs, here, high, float(tried[best]))
+        turned = slope - before
         bend = float(turned @ moved)
         if bend > 1e-10:
-            left = np.eye(k) - np.outer(moved, turned) / bend
+            left = np.eye(start.size) - np.outer(moved, turned) / bend
             inverse = left @ inverse @ left.T + np.outer(moved, moved) / bend
-        if gained < SETTLED_NATS:
-            break
-    return here
+    if inverse is None:
+        inverse = np.eye(start.size)
+    return here, inverse
+
+
+def _slope(
+    costs: Callable[[Sequence[Floats]], Floats], here: Floats, high: Floats, cost: float | None = None
+) -> tuple[float, Floats]:
+    """Cost at a point (k,) and its derivatives (k,), by differences to the side where there is room."""
+    signs = np.where(here + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
+    beside = [here + sign * one for sign, one in zip(signs, np.eye(here.size), strict=True)]
+    found = costs(beside if cost is not None else [here, *beside])
+    if cost is None:
+        cost, found = float(found[0]), found[1:]
+    return cost, (found - cost) / signs
+
+
+def _curved(
+    costs: Callable[[Sequence[Floats]], Floats], start: Floats, low: Floats, high: Floats
+) -> tuple[Floats, float, Floats, Floats]:
+    """A point inside the bounds, its cost, derivatives (k,) and the inverse (k, k) of its curvatures along the axes."""
+    k, h = start.size, CURVATURE_STEP
+    here = np.clip(start, low + h, high - h)
+    steps = h * np.eye(k)
+    found = costs([here, *(here + steps), *(here - steps)])
+    cost, up, down = float(found[0]), found[1 : k + 1], found[k + 1 :]
+    second = np.maximum((up - 2.0 * cost + down) / h**2, LEAST_CURVATURE)
+    return here, cost, (up - down) / (2.0 * h), np.diag(1.0 / second)
 
 
 def _generalised_golden_ratio(dimensions: int) -> float:

@@ -127,13 +127,15 @@ def _of_result(baseline: Baseline, allowances: Sequence[Allowance], saved: Saved
         return
     whose = f"vehicle {earlier.vehicle}" if earlier.run == VEHICLE_RUN else f"run {earlier.run}"
     against = f"{whose} in {baseline.path.name}"
-    for name, now in _estimates(saved.document).items():
-        key = name.rpartition(".")[2]
+    estimates = _estimates(saved.document)
+    for name, now in estimates.items():
+        of, _, key = name.rpartition(".")
+        beside = [other.rpartition(".")[2] for other in estimates if other.rpartition(".")[0] == of]
         fitting = [one for one in allowances if not one.why_not_for(key)]
         before = earlier.estimates.get(name)
         if before is None:
             yield _skipped(saved, name, allowances, f"{against} has no {name}")
-        elif why := why_own_log_only(name.split(".")[1], key):
+        elif why := why_own_log_only(key, beside):
             yield _skipped(saved, name, allowances, why)
         elif why := why_not_estimated(now):
             outcome: Outcome = "failed" if now.status == "estimated" else "skipped"

@@ -8,7 +8,7 @@ Where it cannot, the shape of the drive has to answer.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from sccal.arrays import Floats, Ints
 from sccal.calibration.status import OFFSET_UNOBSERVED_RAD, UNOBSERVED_RATIO
 from sccal.calibration.unseen import STANDS_OUT
 from sccal.effects.catalogue import CATALOGUE
+from sccal.effects.drive_shape import TURN_RAD
 from sccal.effects.effect import Effect
 from sccal.evidence.candidates import plain_forms
 from sccal.evidence.extension import Free, FreeEffects
@@ -46,7 +47,6 @@ CORE = {
     "track": ("track", "turn both ways: arcs, or spins in place"),
     "heading_offset": ("heading offset", "drive at least 10 m forward, with fixes"),
 }
-TURN_RAD = np.radians(180.0)
 
 
 def typical_noise(aligned: Aligned) -> Noise:
@@ -181,51 +181,27 @@ def _correlation(information: Floats, one: Ints, other: Ints, small: Floats) -> 
     return float(np.linalg.svd(np.linalg.solve(left, np.linalg.solve(right, ab.T).T), compute_uv=False).max())
 
 
-@dataclass(frozen=True)
-class _Rule:
-    """What the shape of the drive must hold, when there is no pass to ask."""
-
-    title: str
-    advice: str
-    holds: Callable[[DriveFacts], bool]
-
-
-def _both_ways(drive: DriveFacts) -> bool:
-    return bool(min(drive.turned_left_rad, drive.turned_right_rad) > TURN_RAD)
-
-
-def _two_speeds(drive: DriveFacts) -> bool:
-    return drive.speed_max_mps > 1.6 * drive.speed_median_mps or (drive.reversed_m or 0.0) > 5.0
-
-
-def _of(name: str, holds: Callable[[DriveFacts], bool]) -> tuple[str, _Rule]:
-    if name in CORE:
-        return name, _Rule(*CORE[name], holds)
-    return name, _Rule(CATALOGUE[name].title, CATALOGUE[name].excited_by, holds)
-
-
-_RULES = dict(
-    (
-        _of("radii", lambda drive: _distance(drive) > 20.0),
-        _of("track", lambda drive: drive.turned_left_rad + drive.turned_right_rad > TURN_RAD),
-        _of("heading_offset", lambda drive: _distance(drive) > 10.0),
-        _of("lever_arm", _both_ways),
-        _of("gnss_latency", _two_speeds),
-        _of("hard_iron", lambda drive: drive.headings >= 8),
-        _of("soft_iron", lambda drive: drive.headings >= 8),
-        _of("turn_slip", lambda drive: drive.pivots >= 2 and drive.arcs >= 2 and _both_ways(drive)),
-        _of("speed_slip", lambda drive: drive.speed_max_mps > 1.6 * drive.speed_median_mps),
-        _of("side_slip", lambda drive: drive.pivots >= 2 and _both_ways(drive) and _two_speeds(drive)),
-    )
-)
+_RULES: dict[str, Callable[[DriveFacts], bool]] = {
+    "radii": lambda drive: _distance(drive) > 20.0,
+    "track": lambda drive: drive.turned_left_rad + drive.turned_right_rad > TURN_RAD,
+    "heading_offset": lambda drive: _distance(drive) > 10.0,
+}
+"""What the shape of the drive must hold for a constant, when there is no pass to ask."""
 
 
 def excited_by_shape(drive: DriveFacts) -> tuple[Excited, ...]:
     """Rules of thumb: what a drive of this shape would show if its streams could be brought together."""
-    return tuple(
-        Excited(name, rule.title, "yes" if rule.holds(drive) else "no", rule.advice, {}, {})
-        for name, rule in _RULES.items()
-    )
+    constants = [_by_rule(name, *CORE[name], holds(drive)) for name, holds in _RULES.items()]
+    effects = [
+        _by_rule(effect.name, effect.title, effect.excited_by, shown)
+        for effect in CATALOGUE.values()
+        if (shown := effect.shown_by(drive)) is not None
+    ]
+    return (*constants, *effects)
+
+
+def _by_rule(name: str, title: str, advice: str, shown: bool) -> Excited:
+    return Excited(name, title, "yes" if shown else "no", advice, {}, {})
 
 
 def _distance(drive: DriveFacts) -> float:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from sccal.calibration.result import Estimate
 from sccal.diagnose.result import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
 from sccal.effects.catalogue import CATALOGUE
+from sccal.effects.words import about, percent, sense, size
 from sccal.report.rows import Row
 from sccal.report.summary import held_out_drift
 from sccal.report.text import in_columns, labelled, notice_lines, shortened, wrapped
@@ -21,12 +22,7 @@ FINDINGS_IN_THE_VERDICT = 2
 ADVICE_SHOWN = 4
 INSEPARABLE_SHOWN = 3
 RUNS_NAMED = 4
-CERTAIN = 2.0
-"""Sigmas from which a direction is worth a word."""
 JSON = "diagnosis.json"
-
-_SENTENCES: dict[str, tuple[tuple[str, ...], Callable[..., str]]] = {}
-"""By effect: the parameters that its sentence needs, and the sentence."""
 
 _PORTS = {
     "heading": "the heading readings",
@@ -80,12 +76,10 @@ def verdict_sentence(d: Diagnosis) -> str:
 
 def cause_clause(finding: Finding) -> str:
     """What the machine does: "the antenna sits 0.74 m to the right of the track centre"."""
+    found = {name: one for name, one in finding.parameters.items() if math.isfinite(one.value)}
     where, tilde, column = finding.name.partition("~")
-    needed, sentence = _SENTENCES.get(where if tilde else finding.name, ((), _generic))
-    estimates = [finding.parameters[name] for name in needed if name in finding.parameters]
-    if not needed or len(estimates) < len(needed) or not all(math.isfinite(e.value) for e in estimates):
-        return _generic(finding)
-    return one_line(sentence(column, *estimates) if tilde else sentence(*estimates))
+    said = _column_says(where, column, found) if tilde else _effect_says(finding.name, found)
+    return one_line(said) if said else _generic(finding)
 
 
 def brings_clause(d: Diagnosis) -> str:
@@ -155,9 +149,9 @@ def detectable_line(detectable: Iterable[Detectable]) -> str:
 def smallest_text(one: Detectable) -> str:
     """``forward_m 0.03 m, left_m 0.02 m``; a parameter that is only a unit goes without its name."""
     parts = []
-    for name, size in one.smallest.items():
+    for name, least in one.smallest.items():
         unit = _unit(one.units.get(name, ""))
-        size_text = f"{plain(size, 2)} {unit}".strip()
+        size_text = f"{plain(least, 2)} {unit}".strip()
         parts.append(size_text if len(one.smallest) == 1 else f"{name} {size_text}")
     return ", ".join(parts)
 
@@ -283,7 +277,7 @@ def _drift_now(judgement: Judgement) -> str:
     window = short(judgement.window_s)
     if judgement.outage_end_rms_m is None:
         return f"no window of {window} s without fixes fits into the data"
-    return f"the drift after {window} s without fixes is {_about(judgement.outage_end_rms_m)} m"
+    return f"the drift after {window} s without fixes is {about(judgement.outage_end_rms_m)} m"
 
 
 def _fixed(value: float) -> str:
@@ -295,15 +289,10 @@ def _or_dash(value: float | None) -> str:
 
 
 def _change(before: float, after: float, unit: str) -> str:
-    was, now = _about(before), _about(after)
+    was, now = about(before), about(after)
     if was == now:
         return f"stays at {now} {unit}"
     return f"{'falls' if after < before else 'rises'} from {was} {unit} to {now} {unit}"
-
-
-def _about(value: float) -> str:
-    """Three digits from one on, two below: 1.37, 12.3, 0.86, 0.055."""
-    return plain(value, 3 if abs(value) >= 1.0 else 2)
 
 
 def _nats(value: float) -> str:
@@ -352,198 +341,29 @@ def _generic(finding: Finding) -> str:
     return one_line(finding.title + (f" ({', '.join(values)})" if values else ""))
 
 
-def _says(effect: str, parameters: str) -> Callable[[Callable[..., str]], Callable[..., str]]:
-    """Register the sentence of an effect, with the parameters that it takes in their order."""
-
-    def register(sentence: Callable[..., str]) -> Callable[..., str]:
-        _SENTENCES[effect] = (tuple(parameters.split()), sentence)
-        return sentence
-
-    return register
-
-
-def _size(estimate: Estimate) -> str:
-    return _about(abs(estimate.value))
-
-
-def _percent(estimate: Estimate) -> str:
-    return f"{_about(100.0 * abs(estimate.value))} %"
-
-
-def _amplitude(one: Estimate, other: Estimate) -> float:
-    return math.hypot(one.value, other.value)
-
-
-def _sense(estimate: Estimate) -> str:
-    return "to the left (counter-clockwise)" if estimate.value > 0.0 else "to the right (clockwise)"
-
-
-def _less(estimate: Estimate, below_zero: str = "further") -> str:
-    return "less" if estimate.value > 0.0 else below_zero
-
-
-@_says("lever_arm", "forward_m left_m")
-def _lever_arm(forward: Estimate, left: Estimate) -> str:
-    parts = [
-        (abs(forward.value), forward, f"{_size(forward)} m {'ahead' if forward.value > 0.0 else 'behind'}"),
-        (abs(left.value), left, f"{_size(left)} m to the {'left' if left.value > 0.0 else 'right'}"),
-    ]
-    largest = max(size for size, _, _ in parts)
-    words = [
-        text for size, e, text in parts if size == largest or size > CERTAIN * e.sigma or not math.isfinite(e.sigma)
-    ]
-    return f"the antenna sits {' and '.join(words)} of the track centre".replace("behind of", "behind")
-
-
-@_says("gnss_latency", "s")
-def _gnss_latency(age: Estimate) -> str:
-    return f"the fixes show where the antenna was {_size(age)} s {'before' if age.value > 0.0 else 'after'} their stamp"
-
-
-@_says("heading_latency", "s")
-def _heading_latency(age: Estimate) -> str:
-    return (
-        f"the AHRS readings show the heading of {_size(age)} s {'before' if age.value > 0.0 else 'after'} their stamp"
-    )
-
-
-@_says("clock_skew", "ppm")
-def _clock_skew(rate: Estimate) -> str:
-    return f"the fixes' clock runs {_size(rate)} ppm {'fast' if rate.value > 0.0 else 'slow'} against the wheels'"
-
-
-@_says("hard_iron", "cos_deg sin_deg")
-def _hard_iron(cos: Estimate, sin: Estimate) -> str:
-    return f"magnetised parts near the compass turn it by up to {_about(_amplitude(cos, sin))} deg, once per full turn"
-
-
-@_says("soft_iron", "cos2_deg sin2_deg")
-def _soft_iron(cos: Estimate, sin: Estimate) -> str:
-    return f"iron near the compass turns it by up to {_about(_amplitude(cos, sin))} deg, twice per full turn"
-
-
-@_says("speed_field", "deg_per_mps")
-def _speed_field(rate: Estimate) -> str:
-    return f"the motors' field turns the compass by {_size(rate)} deg {_sense(rate)} for each m/s of speed"
-
-
-@_says("heading_drift", "deg_per_hour")
-def _heading_drift(rate: Estimate) -> str:
-    return f"the AHRS heading drifts by {_size(rate)} deg an hour {_sense(rate)}"
-
-
-@_says("heading_step", "deg at_s")
-def _heading_step(jump: Estimate, at: Estimate) -> str:
-    return f"the AHRS heading jumps by {_size(jump)} deg {_sense(jump)} {_moment(at)}"
-
-
-@_says("radius_step", "ratio at_s")
-def _radius_step(ratio: Estimate, at: Estimate) -> str:
-    return f"both wheels' radii {'grow' if ratio.value > 0.0 else 'shrink'} by {_percent(ratio)} {_moment(at)}"
-
-
-@_says("base_shift", "east_m north_m at_s")
-def _base_shift(east: Estimate, north: Estimate, at: Estimate) -> str:
-    return f"all fixes jump by {_about(_amplitude(east, north))} m {_moment(at)}"
-
-
-@_says("radius_drift", "per_hour")
-def _radius_drift(rate: Estimate) -> str:
-    return f"both wheels' radii {'grow' if rate.value > 0.0 else 'shrink'} by {_percent(rate)} an hour"
-
-
-@_says("turn_slip", "per_radps")
-def _turn_slip(rate: Estimate) -> str:
-    return f"the robot turns {_percent(rate)} {_less(rate, 'more')} than its wheels say for each rad/s of turn rate"
-
-
-@_says("turn_scrub", "per_radps")
-def _turn_scrub(rate: Estimate) -> str:
-    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each rad/s of turn rate"
-
-
-@_says("speed_slip", "per_mps")
-def _speed_slip(rate: Estimate) -> str:
-    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s of speed"
-
-
-@_says("brake_slip", "per_mps2")
-def _brake_slip(rate: Estimate) -> str:
-    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s² of braking"
-
-
-@_says("drive_slip", "per_mps2")
-def _drive_slip(rate: Estimate) -> str:
-    return f"the robot travels {_percent(rate)} {_less(rate)} than its wheels say for each m/s² of speeding up"
-
-
-@_says("speed_offset", "mps")
-def _speed_offset(offset: Estimate) -> str:
-    return f"the wheels read {_size(offset)} m/s too {'fast' if offset.value > 0.0 else 'slow'} while the robot moves"
-
-
-@_says("heading_scale", "ratio")
-def _heading_scale(ratio: Estimate) -> str:
-    return f"the AHRS reading turns {_percent(ratio)} {'further' if ratio.value > 0.0 else 'less'} than the robot"
-
-
-@_says("antenna_height", "m")
-def _antenna_height(height: Estimate) -> str:
-    where = "above" if height.value > 0.0 else "below"
-    return f"the antenna stands {_size(height)} m {where} the ground, and swings out where the robot pitches and rolls"
-
-
-@_says("side_slip", "s")
-def _side_slip(time: Estimate) -> str:
-    way = "outwards" if time.value > 0.0 else "inwards"
-    return f"the robot slides {way} in turns, at {_size(time)} m/s for each m/s² of sideways acceleration"
-
-
-@_says("missed_left", "ratio above_radps")
-def _missed_left(ratio: Estimate, above: Estimate) -> str:
-    return f"the left wheel's counter {_missed(ratio, above)}"
-
-
-@_says("missed_right", "ratio above_radps")
-def _missed_right(ratio: Estimate, above: Estimate) -> str:
-    return f"the right wheel's counter {_missed(ratio, above)}"
-
-
-def _missed(ratio: Estimate, above: Estimate) -> str:
-    fast = f" above {_size(above)} rad/s" if above.value > 0.0 else ""
-    return f"{'loses' if ratio.value > 0.0 else 'adds'} {_percent(ratio)} of its counts{fast}"
-
-
-@_says("local_field", "deg east_m north_m radius_m")
-def _local_field(deg: Estimate, east: Estimate, north: Estimate, radius: Estimate) -> str:
-    place = f"{plain(east.value)} m east, {plain(north.value)} m north of the run's origin"
-    return f"within about {_size(radius)} m of one place ({place}) the compass is turned by up to {_size(deg)} deg"
-
-
-@_says("heading", "deg_per_unit")
-def _heading_column(column: str, slope: Estimate) -> str:
-    return f"the AHRS heading turns with {column}, by {_size(slope)} deg {_sense(slope)} per unit"
-
-
-@_says("along", "per_unit")
-def _along_column(column: str, slope: Estimate) -> str:
-    return f"the distance driven changes with {column}, by {_signed_percent(slope)} per unit"
-
-
-@_says("yaw", "per_unit")
-def _yaw_column(column: str, slope: Estimate) -> str:
-    return f"the turning changes with {column}, by {_signed_percent(slope)} per unit"
-
-
-@_says("side", "per_unit")
-def _side_column(column: str, slope: Estimate) -> str:
-    way = "left" if slope.value > 0.0 else "right"
-    return f"{column} pushes the robot to the {way}, by {_percent(slope)} of the distance driven per unit"
-
-
-def _signed_percent(estimate: Estimate) -> str:
-    return f"{'+' if estimate.value > 0.0 else '-'}{_percent(estimate)}"
-
-
-def _moment(at: Estimate) -> str:
-    return f"{plain(at.value, 3)} s after the run's start"
+def _effect_says(name: str, found: Mapping[str, Estimate]) -> str:
+    """Empty where it says no more than its title, or where a value that it needs is missing."""
+    effect = CATALOGUE.get(name)
+    if effect is None or any(one.default is None and one.name not in found for one in effect.parameters):
+        return ""
+    said = effect.says(found)
+    return "" if said == effect.title else said
+
+
+def _column_says(where: str, column: str, found: Mapping[str, Estimate]) -> str:
+    """What follows a column of the log; empty where there are no words for it."""
+    angle, share = found.get("deg_per_unit"), found.get("per_unit")
+    if where == "heading" and angle:
+        return f"the AHRS heading turns with {column}, by {size(angle)} deg {sense(angle)} per unit"
+    if where == "along" and share:
+        return f"the distance driven changes with {column}, by {_signed_percent(share)} per unit"
+    if where == "yaw" and share:
+        return f"the turning changes with {column}, by {_signed_percent(share)} per unit"
+    if where == "side" and share:
+        way = "left" if share.value > 0.0 else "right"
+        return f"{column} pushes the robot to the {way}, by {percent(share)} of the distance driven per unit"
+    return ""
+
+
+def _signed_percent(share: Estimate) -> str:
+    return f"{'+' if share.value > 0.0 else '-'}{percent(share)}"

@@ -8,6 +8,7 @@ data share their errors.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from sccal.results.saved import SavedEstimate
@@ -50,11 +51,14 @@ def unit_of(key: str) -> str:
     return ""
 
 
-def why_own_log_only(effect: str, key: str) -> str:
-    """Why an effect's parameter means something in its own log only; empty for all others."""
+def why_own_log_only(key: str, beside: Collection[str]) -> str:
+    """Why an effect's parameter means something in its own log only; empty for all others.
+
+    ``beside`` are all keys of the effect: an east and a north that have a radius are a place, without one a distance.
+    """
     if key == "at_s":
         return "a moment of its own log"
-    if effect == "local_field" and key in ("east_m", "north_m"):
+    if key in ("east_m", "north_m") and "radius_m" in beside:
         return "a place counted from its own log's origin"
     return ""
 

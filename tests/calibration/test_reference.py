@@ -89,7 +89,7 @@ def test_displaced_fixes_are_judged_by_where_they_were(run):
     assert told.outage.end_rms_m < 0.4 * blind.outage.end_rms_m
     assert "before they were displaced" in told.outage.how
     assert told.against_reference.losses is None
-    assert told.against_reference.displaced == pytest.approx(noisy.fixes.lat_deg.size, abs=3)
+    assert told.against_reference.displaced == pytest.approx(noisy.fixes.lat_deg.size, rel=0.01)
     assert told.against_reference.displaced_rms_m < 1.0
 
 

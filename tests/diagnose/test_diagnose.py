@@ -201,7 +201,6 @@ def test_what_has_no_name_is_told_by_port_and_by_what_it_follows():
     assert float(left.size.removeprefix("up to ").removesuffix(" deg")) == pytest.approx(HARMONIC_DEG, rel=0.2)
 
 
-@pytest.mark.xfail(strict=True, reason="the noise of the model without the pattern holds what the pattern explains")
 def test_what_has_no_name_is_told_with_its_share_of_the_error():
     """The AHRS errs by 0.43 deg beside the harmonic's rms."""
     share = HARMONIC_DEG**2 / 2.0

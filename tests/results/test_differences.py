@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sccal.results.differences import Difference, difference, unit_of, why_not_estimated
+from sccal.results.differences import Difference, difference, unit_of, why_not_estimated, why_own_log_only
 from sccal.results.saved import SavedEstimate
 
 angles = st.floats(-180.0, 180.0, exclude_min=True)
@@ -54,6 +54,12 @@ def test_without_sigmas_any_difference_is_infinitely_many():
 )
 def test_units_stand_at_the_end_of_names(key, unit):
     assert unit_of(key) == unit
+
+
+def test_moments_and_places_mean_something_in_their_own_log_only():
+    place, shift = ("deg", "east_m", "north_m", "radius_m"), ("east_m", "north_m", "at_s")
+    assert [key for key in place if why_own_log_only(key, place)] == ["east_m", "north_m"]
+    assert [key for key in shift if why_own_log_only(key, shift)] == ["at_s"]
 
 
 def test_only_estimates_with_a_value_can_be_compared():
