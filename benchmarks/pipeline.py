@@ -14,8 +14,8 @@ from pathlib import Path
 from benchmarks.timing import head, show, timed
 from sccal.align import align, build_timeline
 from sccal.calibration.options import CalibrationOptions
-from sccal.filter.levels import Noise
 from sccal.filter.iterate import RunProblem
+from sccal.filter.levels import Noise
 from sccal.filter.start import find_start
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
 from sccal.logs.run import discover, read_run

@@ -10,7 +10,7 @@ import numpy as np
 from sccal.calibration.held_out import how, judge
 from sccal.calibration.result import Calibration, Estimate, HeldOut, Parameters, VehicleCalibration
 from sccal.evidence.extension import FreeEffects
-from sccal.evidence.model import Model, model_of
+from sccal.evidence.model import CONTRADICTED, Model, Trust, bare_model, model_of, refitted
 from sccal.evidence.nuisance import sigmas_beside_small
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
@@ -43,7 +43,8 @@ def judged_held_out(model: Model, window_s: float) -> HeldOut | None:
 def widened(effects: Effects, model: Model) -> Effects:
     """A calibration's effects with sigmas as wide as small amounts of all other effects leave them.
 
-    Never below the fit's own, and with the part that no log shows.
+    Never below the fit's own, and with the part that no log shows. Where the log contradicts its own noise, how far
+    the answer moves when only the whole path counts is part of what is not known.
     """
     if not model.accepted:
         return effects
@@ -56,7 +57,13 @@ def widened(effects: Effects, model: Model) -> Effects:
         for parameter in one.free.parameters
     }
 
-    def sigma_of(effect: str, parameter: str, own: float) -> float:
+    elsewhere = _along_the_path(model) if model.fit.misfit > CONTRADICTED else {}
+
+    def sigma_of(effect: str, parameter: str, one: Estimate) -> float:
+        own = one.sigma
+        if (effect, parameter) in elsewhere:
+            value, sigma = elsewhere[effect, parameter]
+            own = max(own, sigma, abs(value - one.value))
         if (effect, parameter) not in hidden:
             return own
         others = np.array(beside.get((effect, parameter), [0.0]))
@@ -64,9 +71,21 @@ def widened(effects: Effects, model: Model) -> Effects:
         return float(np.hypot(max(own, pooled), hidden[effect, parameter]))
 
     return {
-        effect: {name: replace(one, sigma=sigma_of(effect, name, one.sigma)) for name, one in parameters.items()}
+        effect: {name: replace(one, sigma=sigma_of(effect, name, one)) for name, one in parameters.items()}
         for effect, parameters in effects.items()
     }
+
+
+def _along_the_path(model: Model) -> dict[tuple[str, str], tuple[float, float]]:
+    """Value and sigma of every effect's parameters if only the whole path counts, by effect and parameter."""
+    options = model.problems[0].options
+    bare = bare_model([one.aligned for one in model.problems], options, model.heading_rate_hz, Trust.PATH)
+    fit = refitted(bare, model.accepted).fit
+    sigmas = np.sqrt(np.diag(fit.all_robust))
+    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for (effect, name, _), value, sigma in zip(fit.places.keys, fit.values.tolist(), sigmas.tolist(), strict=True):
+        found.setdefault((effect.partition("(")[0], name), []).append((value, sigma))
+    return {key: (float(np.mean([v for v, _ in some])), max(s for _, s in some)) for key, some in found.items()}
 
 
 def _at(problem: RunProblem, parameters: Parameters, effects: Effects) -> At:

@@ -33,9 +33,5 @@ PATTERN_NATS = 12.0
 BEYOND_SIGMAS = 6.75
 """A size beyond which a log would have shown an effect: half as much again as LEAST_T, so that it seldom misses."""
 
-MISFIT_TOLD = 3.0
-"""χ² per degree of freedom of the stretches' scores from which on a log contradicts its own noise. Effect-free
-simulated logs have 0.6 to 0.9, the measured ones 6 (Husky) and 25 (van)."""
-
 CLEARLY_LESS = 0.9
 """Of a drift: less than that is clearly less. The rms of some thirty windows is known to about a tenth."""

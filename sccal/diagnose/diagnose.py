@@ -24,7 +24,6 @@ from sccal.diagnose.criteria import (
     ALIKE_SHARE,
     CLEARLY_LESS,
     LEAST_NATS,
-    MISFIT_TOLD,
     PRICE_NATS,
 )
 from sccal.diagnose.excitation import excitation
@@ -43,7 +42,7 @@ from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.logged import LoggedColumn
 from sccal.evidence.extension import Free
 from sccal.evidence.joint import Key
-from sccal.evidence.model import Accepted, Model, Trust, refitted
+from sccal.evidence.model import CONTRADICTED, Accepted, Model, Trust, refitted
 from sccal.evidence.nonsense import NonsenseColumn, with_nonsense
 from sccal.evidence.nuisance import sigmas_beside_small
 from sccal.evidence.posterior import Posterior
@@ -82,7 +81,7 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     """
     dressed, nonsense = with_nonsense(runs)
     loop = run_loop(runs, options.filter, options.heading_rate_hz)
-    if loop.model.fit.misfit > MISFIT_TOLD:
+    if loop.model.fit.misfit > CONTRADICTED:
         loop = _more_trusted(loop, runs, options)
     placebo = _chance(loop, dressed, nonsense)
     before = judge(loop.first, options.outage_window_s)

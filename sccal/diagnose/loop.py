@@ -95,13 +95,13 @@ def run_loop(
     if trust is Trust.PATH and len(runs) >= WHOLE_RUNS:
         candidates = replace(candidates, free=tuple(one for one in candidates.free if _of_vehicle(one)))
     competing = best_forms(first, candidates, ())
-    saturated = saturate(first, competing, _prices(competing), Reach.FEW)
+    saturated = saturate(first, competing, _prices(competing), Reach.ROUGH)
     loop = Loop(first, first, candidates, saturated)
     kept: list[Accepted] = []
     for _ in range(MOST_ROUNDS):
         before = {one.key for one in kept}
         kept = _chosen(loop, competing)
-        loop.model = _refitted(loop, kept)
+        loop.model = _refitted(loop, kept, Reach.LOOK)
         kept, moments = _with_shapes(loop, kept)
         if {one.key for one in kept} == before and not moments:
             break
@@ -109,9 +109,8 @@ def run_loop(
         known = [*kept, *(one.accepted for one in loop.moments)]
         competing = [*best_forms(loop.model, candidates, kept), *(one for one in known if one.run is not None)]
         competing = list({one.key: one for one in competing}.values())
-        loop.saturated = saturate(loop.model, competing, _prices(competing), Reach.NEAR, _noises(loop.saturated))
-    else:
-        loop.model = _refitted(loop, _chosen(loop, competing))
+        loop.saturated = saturate(loop.model, competing, _prices(competing), Reach.LOOK, _noises(loop.saturated))
+    loop.model = _refitted(loop, _chosen(loop, competing))
     _take_back(loop)
     return loop
 
@@ -148,10 +147,10 @@ def _in_order(posterior: Posterior, kept: Sequence[str]) -> list[str]:
     return ordered
 
 
-def _refitted(loop: Loop, kept: Sequence[Accepted]) -> Model:
+def _refitted(loop: Loop, kept: Sequence[Accepted], reach: Reach = Reach.NEAR) -> Model:
     """The chosen effects with their own noise, starting from where the saturated fit has them."""
     starts = loop.saturated.given([one.key for one in kept])
-    return refitted(loop.saturated.model, kept, starts, Reach.NEAR, _noises(loop.saturated))
+    return refitted(loop.saturated.model, kept, starts, reach, _noises(loop.saturated))
 
 
 def _with_shapes(loop: Loop, kept: list[Accepted]) -> tuple[list[Accepted], list[Found]]:

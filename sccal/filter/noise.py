@@ -70,6 +70,8 @@ class Reach(Enum):
     WIDE = POINTS
     FEW = 24
     """Where a noise near the right one is known, but another hill may have become the higher one."""
+    ROUGH = 23
+    """The same on the thinned log alone: beside many candidates, whose refit has a search of its own."""
     NEAR = 0
     """Where the noise can only move a little: one climb from what is known."""
     LOOK = -1
@@ -130,6 +132,8 @@ def estimate_noise(
         found = search.climbed(fine if reach is Reach.NEAR else coarse, known[0], rough)
         return search.noise(found.logs), found.at
     best, apart = search.top(coarse, known, rough, reach)
+    if reach is Reach.ROUGH:
+        return replace(search.noise(best.logs), apart_nats=apart), best.at
     found = search.climbed(fine, best.logs, best.at, best.inverse)
     return replace(search.noise(found.logs), apart_nats=apart), found.at
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from sccal.align import Series
-from sccal.evidence.extension import FreeEffects
 from sccal.effects.logged import LoggedColumn, Range, logged_effects
 from sccal.errors import DataError, SccalError, UsageError
+from sccal.evidence.extension import FreeEffects
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import WheelPair
 from tests.effects.harness import injected
