@@ -15,6 +15,7 @@ from sccal.diagnose.result import Unexplained
 from sccal.effects.patterns import PATTERNS, Pattern
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model
+from sccal.evidence.posterior import Posterior
 from sccal.evidence.saturated import saturate
 from sccal.filter.noise import Reach
 
@@ -27,7 +28,10 @@ def unexplained(loop: Loop) -> Unexplained:
     patterns = {pattern.name: Accepted(Free(pattern)) for pattern in PATTERNS}
     full = saturate(loop.model, [*kept, *patterns.values()], dict.fromkeys(patterns, PRICE_NATS), Reach.LOOK)
     posterior, keys = full.posterior, [one.key for one in kept]
-    gains = {name: posterior.gain(name, keys) for name in patterns}
+    within = [name for name in patterns if _is_within_bounds(posterior, [*keys, name], name, patterns[name].free)]
+    gains = {name: posterior.gain(name, keys) for name in within}
+    if not gains:
+        return Unexplained(False)
     best = max(gains, key=lambda name: gains[name])
     pattern = patterns[best].free.effect
     assert isinstance(pattern, Pattern)
@@ -49,6 +53,15 @@ def unexplained(loop: Loop) -> Unexplained:
         t=t,
         size=size,
     )
+
+
+def _is_within_bounds(posterior: Posterior, kept: list[str], name: str, free: Free) -> bool:
+    """Whether a pattern beside the model stays where it can be a description: beyond, its fit has run away."""
+    mean, _ = posterior.given(kept)
+    places = posterior.places(kept)
+    values = mean[np.isin(places, posterior.rows[name])] * posterior.sigma[posterior.rows[name]]
+    low, high = (np.array([getattr(one, end) for one in free.parameters]) for end in ("lower", "upper"))
+    return bool(np.all((values > 0.25 * low) & (values < 0.25 * high)))
 
 
 def variance_fraction(model: Model, pattern: Pattern, values: Floats) -> tuple[float, str]:
