@@ -1,6 +1,6 @@
 """What makes an effect a finding: each number once, with what it decides and where it comes from.
 
-The rates stand in docs/study-effects.md; `make study-effects` and `make study-noise` measure them anew.
+`make study-effects` and `make study-noise` measure the rates of false and missed findings that they buy.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ PRICE_NATS = 3.0
 effects compete, and a robot has two or three of them."""
 
 LEAST_NATS = 8.0
-"""What a finding must bring: odds of 3000 to 1 for it, after its price. Among the fifty candidates of a log without
-effects the best brings so much less than once in a hundred logs."""
+"""What a finding must bring: odds of 3000 to 1 for it, after its price. With fifty candidates that is meant to leave
+less than one false finding in a hundred logs."""
 
 LEAST_T = 4.5
 """What a finding must be over its own sigma, stretches and runs counted as clusters: of fifty values with normal errors
