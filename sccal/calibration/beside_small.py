@@ -9,7 +9,7 @@ import numpy as np
 
 from sccal.calibration.held_out import how, judge
 from sccal.calibration.result import Calibration, Estimate, HeldOut, Parameters, VehicleCalibration
-from sccal.evidence.extension import FreeEffects
+from sccal.evidence.extension import FreeEffects, name_in
 from sccal.evidence.model import CONTRADICTED, Model, Trust, bare_model, model_of, refitted
 from sccal.evidence.nuisance import sigmas_beside_small
 from sccal.filter.iterate import At, RunProblem
@@ -50,7 +50,7 @@ def widened(effects: Effects, model: Model) -> Effects:
         return effects
     beside: dict[tuple[str, str], list[float]] = {}
     for (effect, parameter, _), sigma in sigmas_beside_small(model).items():
-        beside.setdefault((effect.partition("(")[0], parameter), []).append(sigma)
+        beside.setdefault((name_in(effect), parameter), []).append(sigma)
     hidden = {
         (one.free.effect.name, parameter.name): parameter.hidden_sigma
         for one in model.accepted
@@ -84,7 +84,7 @@ def _along_the_path(model: Model) -> dict[tuple[str, str], tuple[float, float]]:
     sigmas = np.sqrt(np.diag(fit.all_robust))
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for (effect, name, _), value, sigma in zip(fit.places.keys, fit.values.tolist(), sigmas.tolist(), strict=True):
-        found.setdefault((effect.partition("(")[0], name), []).append((value, sigma))
+        found.setdefault((name_in(effect), name), []).append((value, sigma))
     return {key: (float(np.mean([v for v, _ in some])), max(s for _, s in some)) for key, some in found.items()}
 
 

@@ -11,16 +11,15 @@ from sccal.arrays import Floats
 from sccal.calibration.result import Missing
 from sccal.effects.logged import logged_effects
 from sccal.effects.view import DriveView
-from sccal.evidence.candidates import plain_forms, without_shadows
-from sccal.evidence.extension import Free
+from sccal.evidence.candidates import without_shadows
+from sccal.evidence.extension import Free, plain_forms
 from sccal.evidence.model import Accepted, model_of
-from sccal.evidence.posterior import Posterior
+from sccal.evidence.posterior import PRICE_NATS
 from sccal.evidence.saturated import saturate
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.noise import Reach
 from sccal.filter.start import Constants
 
-PRICE_NATS = 3.0
 STRONG_NATS = 20.0
 """Odds of 5 × 10⁸: a quick look that is wrong would take the verdict from a good log."""
 
@@ -37,7 +36,7 @@ def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float
     kept = posterior.select(known)
     by_key = {one.key: one.free for one in candidates}
     found = [
-        Missing(free.effect.name, free.effect.title, posterior.worth(key, kept), _size(posterior, free, kept))
+        Missing(free.effect.name, free.effect.title, posterior.worth(key, kept), posterior.size(free, kept))
         for key, free in by_key.items()
         if key in kept
     ]
@@ -49,12 +48,3 @@ def _candidates(view: DriveView) -> list[Free]:
     named = plain_forms()
     columns, _ = without_shadows(named, [Free(one) for one in logged_effects([view.logged])], [view])
     return [*named, *columns]
-
-
-def _size(posterior: Posterior, free: Free, kept: list[str]) -> float:
-    """Largest parameter in units of the smallest size that matters, if all that is not kept is zero."""
-    mean, _ = posterior.given(kept)
-    of_row = dict(zip(posterior.places(kept).tolist(), mean.tolist(), strict=True))
-    values = [of_row[row] for row in posterior.rows[free.key].tolist()]
-    least = [max(one.matters / one.prior_sigma, 1e-12) for one in free.parameters]
-    return float(max(abs(value) / size for value, size in zip(values, least, strict=True)))

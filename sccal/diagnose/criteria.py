@@ -1,13 +1,12 @@
 """What makes an effect a finding: each number once, with what it decides and where it comes from.
 
+What an effect costs at all stands with the evidence (PRICE_NATS in sccal.evidence.posterior), and from when on a log
+contradicts its noise with the model (CONTRADICTED in sccal.evidence.model), since a calibration asks for both too.
+
 `make study-effects` and `make study-noise` measure the rates of false and missed findings that they buy.
 """
 
 from __future__ import annotations
-
-PRICE_NATS = 3.0
-"""What an effect must bring to be in the model at all: minus the logarithm of its prior odds, 1 in 20. Some fifty
-effects compete, and a robot has two or three of them."""
 
 LEAST_NATS = 8.0
 """What a finding must bring: odds of 3000 to 1 for it, after its price. With fifty candidates that is meant to leave

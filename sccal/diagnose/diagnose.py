@@ -24,7 +24,6 @@ from sccal.diagnose.criteria import (
     ALIKE_SHARE,
     CLEARLY_LESS,
     LEAST_NATS,
-    PRICE_NATS,
 )
 from sccal.diagnose.excitation import excitation
 from sccal.diagnose.loop import Loop, Sized, run_loop, values_in
@@ -40,12 +39,12 @@ from sccal.diagnose.result import (
 from sccal.diagnose.unexplained import unexplained
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.logged import LoggedColumn
-from sccal.evidence.extension import Free
+from sccal.evidence.extension import Free, name_in
 from sccal.evidence.joint import Key
 from sccal.evidence.model import CONTRADICTED, Accepted, Model, Trust, refitted
 from sccal.evidence.nonsense import NonsenseColumn, with_nonsense
 from sccal.evidence.nuisance import sigmas_beside_small
-from sccal.evidence.posterior import Posterior
+from sccal.evidence.posterior import PRICE_NATS, Posterior
 from sccal.evidence.saturated import posterior_of
 from sccal.filter.noise import Reach
 
@@ -175,7 +174,7 @@ def _aliases(loop: Loop, one: Sized) -> tuple[str, ...]:
     rest = [name for name in kept if name != key]
     whole, allowed = posterior.evidence(kept), max(ALIKE_NATS, ALIKE_SHARE * one.worth_nats)
     found = [
-        name.partition("(")[0]
+        name_in(name)
         for name in posterior.rows
         if name not in kept and whole - posterior.evidence([*rest, name]) < allowed
     ]
@@ -256,13 +255,10 @@ def _ranking(loop: Loop, one: Sized) -> tuple[Ranked, ...]:
 
 
 def _ranked(posterior: Posterior, free: Free, key: str, gain: float, before: Sequence[str]) -> Ranked:
-    mean, covariance = posterior.given([*before, key])
-    places = posterior.places([*before, key])
-    mine = np.flatnonzero(np.isin(places, posterior.rows[key]))
-    t = float(np.sqrt(max(float(mean[mine] @ np.linalg.solve(covariance[np.ix_(mine, mine)], mean[mine])), 0.0)))
+    kept = [*before, key]
     matters = max(min(one.matters / one.prior_sigma for one in free.parameters), 1e-12)
-    size = float(np.abs(mean[mine]).max()) / matters
-    return Ranked(free.effect.name, free.effect.title, True, gain, t, size)
+    size = float(np.abs(posterior.of(key, kept)[0]).max()) / matters
+    return Ranked(free.effect.name, free.effect.title, True, gain, posterior.t(key, kept), size)
 
 
 def _judgement(judged: Judged) -> Judgement:

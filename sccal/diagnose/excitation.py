@@ -6,19 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sccal.arrays import Floats, Ints
+from sccal.arrays import Floats
 from sccal.diagnose.criteria import BEYOND_SIGMAS
 from sccal.diagnose.result import Detectable, Inseparable, NotExcited
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
 from sccal.effects.logged import LoggedColumn
 from sccal.evidence.candidates import Candidates
+from sccal.evidence.confounding import SAME, correlation, reduced
+from sccal.evidence.extension import name_in
 from sccal.evidence.model import Model
 from sccal.evidence.nuisance import SMALL
 from sccal.evidence.posterior import CONSTANTS, Posterior
-
-SAME = 0.98
-"""Correlation from which on two effects are one."""
 
 
 def excitation(
@@ -28,7 +27,7 @@ def excitation(
 
     ``saturated`` is the fit that the posterior comes from, with every candidate in one form.
     """
-    found = {one.partition("(")[0] for one in kept}
+    found = {name_in(one) for one in kept}
     seen = _Seen(posterior)
     free = {one.key: one.free for one in saturated.accepted if one.key not in kept and one.run is None}
     hidden: list[NotExcited] = []
@@ -64,19 +63,16 @@ class _Seen:
         self.small = np.full(size, SMALL * 0.1)
         self.small[:CONSTANTS] = 1.0
 
-    def reduced(self, kept: Ints) -> Floats:
-        """Information about some parameters with the others, within their small priors, marginalised."""
-        others = np.setdiff1d(np.arange(self.small.size), kept)
-        inner = self.information[np.ix_(others, others)] + np.diag(1.0 / self.small[others] ** 2)
-        cross = self.information[np.ix_(kept, others)]
-        return np.asarray(self.information[np.ix_(kept, kept)] - cross @ np.linalg.solve(inner, cross.T))
-
     def sigmas(self, key: str, count: int) -> Floats:
         """(count,) of one effect's parameters, in units of their priors; of a run's parameter, the runs' best."""
         rows = self.posterior.rows[key]
-        reduced = self.reduced(rows) + np.eye(rows.size)
-        sigma = np.sqrt(np.maximum(np.diag(np.linalg.inv(reduced)), 0.0))
+        alone = reduced(self.information, rows, self.small) + np.eye(rows.size)
+        sigma = np.sqrt(np.maximum(np.diag(np.linalg.inv(alone)), 0.0))
         return np.array([sigma[k::count].min() for k in range(count)]) if rows.size > count else sigma
+
+    def correlation(self, one: str, other: str) -> float:
+        """Of two effects' columns."""
+        return correlation(self.information, self.posterior.rows[one], self.posterior.rows[other], self.small)
 
 
 def _sets(seen: _Seen, effects: dict[str, Effect]) -> list[Inseparable]:
@@ -85,7 +81,7 @@ def _sets(seen: _Seen, effects: dict[str, Effect]) -> list[Inseparable]:
     keys = list(effects)
     for k, one in enumerate(keys):
         for other in keys[k + 1 :]:
-            if _correlation(seen, one, other) > SAME:
+            if seen.correlation(one, other) > SAME:
                 joined = {one, other}
                 for group in [group for group in sets if group & joined]:
                     joined |= group
@@ -97,15 +93,3 @@ def _sets(seen: _Seen, effects: dict[str, Effect]) -> list[Inseparable]:
 def _inseparable(effects: Sequence[Effect]) -> Inseparable:
     advice = "; ".join(dict.fromkeys(effect.excited_by for effect in effects))
     return Inseparable(tuple(effect.name for effect in effects), advice)
-
-
-def _correlation(seen: _Seen, one: str, other: str) -> float:
-    """Largest canonical correlation of two effects' columns, with small amounts of all others allowed."""
-    a, b = seen.posterior.rows[one], seen.posterior.rows[other]
-    reduced = seen.reduced(np.concatenate((a, b)))
-    aa, ab, bb = reduced[: a.size, : a.size], reduced[: a.size, a.size :], reduced[a.size :, a.size :]
-    try:
-        left, right = np.linalg.cholesky(aa), np.linalg.cholesky(bb)
-    except np.linalg.LinAlgError:
-        return 0.0
-    return float(np.linalg.svd(np.linalg.solve(left, np.linalg.solve(right, ab.T).T), compute_uv=False).max())

@@ -13,7 +13,7 @@ import numpy as np
 
 from sccal.align import Aligned
 from sccal.arrays import Floats
-from sccal.diagnose.criteria import LEAST_NATS, LEAST_T, PRICE_NATS, SEARCH_NATS
+from sccal.diagnose.criteria import LEAST_NATS, LEAST_T, SEARCH_NATS
 from sccal.diagnose.shapes import Found, best_forms, find_moments, refined
 from sccal.effects.effect import Parameter
 from sccal.evidence.candidates import Candidates, gather_candidates
@@ -22,7 +22,7 @@ from sccal.evidence.held_out_gain import WHOLE_RUNS, held_out_gain
 from sccal.evidence.joint import Key
 from sccal.evidence.model import Accepted, Model, Trust, bare_model, refitted
 from sccal.evidence.parallel import each
-from sccal.evidence.posterior import Posterior
+from sccal.evidence.posterior import PRICE_NATS, Posterior
 from sccal.evidence.saturated import Saturated, saturate
 from sccal.filter.levels import Noise
 from sccal.filter.noise import Reach

@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.diagnose.criteria import PATTERN_NATS, PRICE_NATS
+from sccal.diagnose.criteria import PATTERN_NATS
 from sccal.diagnose.loop import Loop
 from sccal.diagnose.result import Unexplained
 from sccal.effects.patterns import PATTERNS, Pattern
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model
-from sccal.evidence.posterior import Posterior
+from sccal.evidence.posterior import PRICE_NATS, Posterior
 from sccal.evidence.saturated import saturate
 from sccal.filter.noise import Reach
 
@@ -35,31 +35,26 @@ def unexplained(loop: Loop) -> Unexplained:
     best = max(gains, key=lambda name: gains[name])
     pattern = patterns[best].free.effect
     assert isinstance(pattern, Pattern)
-    mean, covariance = posterior.given([*keys, best])
-    places = posterior.places([*keys, best])
-    mine = np.flatnonzero(np.isin(places, posterior.rows[best]))
+    mean, _ = posterior.of(best, [*keys, best])
     least = max(one.matters / one.prior_sigma for one in pattern.parameters)
-    if gains[best] < PATTERN_NATS or float(np.abs(mean[mine]).max()) < least:
+    if gains[best] < PATTERN_NATS or float(np.abs(mean).max()) < least:
         return Unexplained(False)
-    values = mean[mine] * posterior.sigma[posterior.rows[best]]
+    values = mean * posterior.sigma[posterior.rows[best]]
     fraction, size = variance_fraction(full.model, pattern, values)
-    t = float(np.sqrt(max(float(mean[mine] @ np.linalg.solve(covariance[np.ix_(mine, mine)], mean[mine])), 0.0)))
     return Unexplained(
         significant=True,
         port=pattern.port,
         depends_on=pattern.depends_on,
         variance_fraction=fraction,
         evidence_nats=gains[best],
-        t=t,
+        t=posterior.t(best, [*keys, best]),
         size=size,
     )
 
 
 def _is_within_bounds(posterior: Posterior, kept: list[str], name: str, free: Free) -> bool:
     """Whether a pattern beside the model stays where it can be a description: beyond, its fit has run away."""
-    mean, _ = posterior.given(kept)
-    places = posterior.places(kept)
-    values = mean[np.isin(places, posterior.rows[name])] * posterior.sigma[posterior.rows[name]]
+    values = posterior.of(name, kept)[0] * posterior.sigma[posterior.rows[name]]
     low, high = (np.array([getattr(one, end) for one in free.parameters]) for end in ("lower", "upper"))
     return bool(np.all((values > 0.25 * low) & (values < 0.25 * high)))
 

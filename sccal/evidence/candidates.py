@@ -43,19 +43,6 @@ class Candidates:
         return found
 
 
-def plain_form(effect: Effect) -> Free | None:
-    """An effect where its shapes have their usual values; None where they have none and must be searched for."""
-    shapes = [one for one in effect.parameters if one.shape]
-    if any(one.default is None for one in shapes):
-        return None
-    return Free(effect, {one.name: float(one.default) for one in shapes if one.default is not None})
-
-
-def plain_forms() -> list[Free]:
-    """The catalogue's effects that need no search."""
-    return [free for effect in CATALOGUE.values() if (free := plain_form(effect)) is not None]
-
-
 def linear_forms(effect: Effect, views: Sequence[DriveView]) -> list[Free]:
     """An effect as linear candidates: itself, or one for each of its shapes' values that these drives can tell."""
     if not any(one.shape for one in effect.parameters):

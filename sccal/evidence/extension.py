@@ -9,7 +9,7 @@ import numpy as np
 
 from sccal.align import Aligned, Timeline
 from sccal.arrays import Floats
-from sccal.effects.catalogue import effect_named
+from sccal.effects.catalogue import CATALOGUE, effect_named
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.logged import logged_effects
 from sccal.effects.view import Belief, DriveView, view_drive
@@ -188,14 +188,33 @@ def view_run(problem: RunProblem, at: At, clear: tuple[Floats, Floats] | None) -
     return view_drive(problem.aligned, problem.timeline, _belief(problem, at), clear)
 
 
+def name_in(key: str) -> str:
+    """The effect's name in a key of Free."""
+    return key.partition("(")[0]
+
+
+def plain_form(effect: Effect) -> Free | None:
+    """An effect where its shapes have their usual values; None where they have none and must be searched for."""
+    shapes = [one for one in effect.parameters if one.shape]
+    if any(one.default is None for one in shapes):
+        return None
+    return Free(effect, {one.name: float(one.default) for one in shapes if one.default is not None})
+
+
+def plain_forms() -> list[Free]:
+    """The catalogue's effects that need no search."""
+    return [free for effect in CATALOGUE.values() if (free := plain_form(effect)) is not None]
+
+
 def _as_named(effect: Effect) -> Free:
     """An effect with its shapes where they usually are. Raises UsageError where a shape has to be searched for."""
-    lacking = [one.name for one in effect.parameters if one.shape and one.default is None]
-    if lacking:
+    free = plain_form(effect)
+    if free is None:
+        lacking = [one.name for one in effect.parameters if one.shape and one.default is None]
         raise UsageError(
             f"effect {effect.name}: its {', '.join(lacking)} must be searched for, not filtered: `sccal diagnose` does"
         )
-    return Free(effect, {one.name: float(one.default) for one in effect.parameters if one.default is not None})
+    return free
 
 
 def effect_by_name(name: str, aligned: Aligned | None) -> Effect:

@@ -222,11 +222,8 @@ class JointFit:
         for one, rows in zip(self.runs, self.places.of_run, strict=True):
             scale = 1.0 / np.sqrt(np.diag(self.prior)[rows])
             for stretch in one.stretches:
-                score = scale * (stretch.vector - stretch.precision @ self.values[rows])
-                values, vectors = np.linalg.eigh(stretch.precision * np.outer(scale, scale))
-                seen = values > 1.0
-                chi2 += float(((vectors.T @ score)[seen] ** 2 / values[seen]).sum())
-                directions += int(seen.sum())
+                more, seen = _chi2(stretch, self.values[rows], scale)
+                chi2, directions = chi2 + more, directions + seen
         return chi2 / max(directions, 1)
 
     @property
@@ -272,11 +269,6 @@ def _marginal(one: RunLikelihood, rows: Ints, shared: int, prior: Floats) -> _Ma
     precision[np.ix_(rows[common], rows[common])] = block
     vector[rows[common]] = part
     return _Marginal(precision, vector)
-
-
-def shared_places(problem: RunProblem) -> Ints:
-    """Places of the shared ones among R_r, R_l, L and the effects' parameters."""
-    return np.array([0, 1, 2, *(3 + k for k, scope in enumerate(_scopes(problem)) if scope == "vehicle")])
 
 
 def fit_jointly(
@@ -377,16 +369,24 @@ def _prior(problems: Sequence[RunProblem], places: Places) -> tuple[Floats, Floa
     return precision, mean
 
 
+def _chi2(one: Gaussian, at: Floats, scale: Floats) -> tuple[float, int]:
+    """χ² of what a likelihood says against some values (k,), and how many directions it shows beyond the prior.
+
+    ``scale`` (k,) are the sigmas of the prior.
+    """
+    score = scale * (one.vector - one.precision @ at)
+    values, vectors = np.linalg.eigh(one.precision * np.outer(scale, scale))
+    seen = values > 1.0
+    return float(((vectors.T @ score)[seen] ** 2 / values[seen]).sum()), int(seen.sum())
+
+
 def disagreement(likelihoods: Sequence[Gaussian], at: Floats, prior: Floats) -> float | None:
     """χ² of the runs' own answers around the joint one, per degree of freedom, over the directions they observe."""
     chi2, directions = 0.0, 0
     scale = np.sqrt(np.diag(prior))
     for one in likelihoods:
-        score = (one.vector - one.precision @ at) / scale
-        values, vectors = np.linalg.eigh(one.precision / np.outer(scale, scale))
-        seen = values > 1.0
-        chi2 += float(((vectors.T @ score)[seen] ** 2 / values[seen]).sum())
-        directions += int(seen.sum())
+        more, seen = _chi2(one, at, 1.0 / scale)
+        chi2, directions = chi2 + more, directions + seen
     dof = directions - at.size
     return chi2 / dof if dof > 0 and len(likelihoods) > 1 else None
 

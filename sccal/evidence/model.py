@@ -11,7 +11,7 @@ import numpy as np
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.arrays import Floats
 from sccal.effects.view import DriveView
-from sccal.evidence.extension import Free, FreeEffects, view_run
+from sccal.evidence.extension import Free, FreeEffects, name_in, view_run
 from sccal.evidence.joint import JointFit, fit_jointly, names_of
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass
@@ -76,7 +76,11 @@ class Model:
     problems: tuple[RunProblem, ...]
     fit: JointFit
     heading_rate_hz: float
-    trust: Trust
+
+    @property
+    def trust(self) -> Trust:
+        """How far its noise trusts the details."""
+        return trust_in(self.problems[0].noise)
 
     @property
     def nll(self) -> float:
@@ -145,7 +149,7 @@ def model_of(
         else:
             everywhere += [Accepted(free, run) for free, run in some]
     fit = fit_jointly(ready, starts, ROUNDS, with_stretches=True)
-    return Model(tuple(everywhere), tuple(ready), fit, heading_rate_hz, trust)
+    return Model(tuple(everywhere), tuple(ready), fit, heading_rate_hz)
 
 
 def extension_of(accepted: Sequence[Accepted], run: int) -> FreeEffects | None:
@@ -177,7 +181,7 @@ def bare_model(
     ready = each(prepared, runs)
     problems = [problem for problem, _ in ready]
     fit = fit_jointly(problems, [first for _, first in ready], ROUNDS, with_stretches=True)
-    return Model((), tuple(problems), fit, heading_rate_hz, trust)
+    return Model((), tuple(problems), fit, heading_rate_hz)
 
 
 def refitted(
@@ -224,7 +228,7 @@ def refitted(
     ready = each(prepared, range(len(model.problems)))
     problems = [problem for problem, _ in ready]
     fit = fit_jointly(problems, [first for _, first in ready], rounds, with_stretches=True)
-    return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz, model.trust)
+    return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz)
 
 
 def _noise(
@@ -250,7 +254,7 @@ def _carried(model: Model, run: int, extension: FreeEffects | None) -> At:
         return At(at.constants, np.zeros(0))
     known = model.values(run)
     # Another form of an effect starts where the one before it stands.
-    of_name = {(key.partition("(")[0], name): value for (key, name), value in known.items()}
+    of_name = {(name_in(key), name): value for (key, name), value in known.items()}
     wanted = [(free, one.name) for free in extension.effects for one in free.parameters]
     values: Floats = np.array(
         [known.get((free.key, name), of_name.get((free.effect.name, name), 0.0)) for free, name in wanted]

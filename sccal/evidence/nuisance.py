@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.evidence.candidates import plain_forms
+from sccal.evidence.extension import plain_forms
 from sccal.evidence.joint import Key
 from sccal.evidence.model import Accepted, Model, refitted
 

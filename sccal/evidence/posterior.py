@@ -20,9 +20,13 @@ from functools import cached_property
 import numpy as np
 
 from sccal.arrays import Floats, Ints
+from sccal.evidence.extension import Free
 
 CONSTANTS = 3
 """R_r, R_l and L are in every model."""
+PRICE_NATS = 3.0
+"""What an effect must bring to be in the model at all: minus the logarithm of its prior odds, 1 in 20. Some fifty
+effects compete, and a robot has two or three of them."""
 MOST_SWAPPED = 24
 """Exchanges are tried up to so many kept effects: beyond, a log that needs them all is not described by any."""
 
@@ -75,6 +79,22 @@ class Posterior:
         J, h = self._information
         covariance: Floats = np.asarray(np.linalg.inv(J[np.ix_(places, places)]), dtype=np.float64)
         return covariance @ h[places], covariance
+
+    def of(self, name: str, kept: Sequence[str]) -> tuple[Floats, Floats]:
+        """Mean and covariance of one of the kept effects' parameters if the rest is zero, in their priors' units."""
+        mean, covariance = self.given(kept)
+        mine = np.flatnonzero(np.isin(self.places(kept), self.rows[name]))
+        return mean[mine], covariance[np.ix_(mine, mine)]
+
+    def t(self, name: str, kept: Sequence[str]) -> float:
+        """Root of the χ² of one of the kept effects if the rest is zero."""
+        mean, covariance = self.of(name, kept)
+        return float(np.sqrt(max(float(mean @ np.linalg.solve(covariance, mean)), 0.0)))
+
+    def size(self, free: Free, kept: Sequence[str]) -> float:
+        """Largest parameter of a kept effect in units of the smallest size that matters, if the rest is zero."""
+        least = [max(one.matters / one.prior_sigma, 1e-12) for one in free.parameters]
+        return float((np.abs(self.of(free.key, kept)[0]) / least).max())
 
     def worth(self, name: str, kept: Sequence[str]) -> float:
         """What one of the kept effects brings: the evidence with it over that without."""

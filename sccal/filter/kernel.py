@@ -136,6 +136,15 @@ def _mixture(inlier: float, outlier: float) -> float:
 
 
 @compiled
+def _judged(inlier: float, outlier: float, nis: float, gate: float, soft: bool) -> tuple[float, bool]:
+    """By how much a measurement counts, and whether it is accepted: softly by its probability, or by its gate."""
+    if not soft:
+        return 1.0, nis <= gate
+    weight = 1.0 / (1.0 + math.exp(min(outlier - inlier, 50.0)))
+    return weight, weight > 0.5
+
+
+@compiled
 def _take_heading(
     belief: Belief,
     events: Events,
@@ -152,12 +161,7 @@ def _take_heading(
     nu, s_core, s = expect_heading(belief, v, g, q, events, columns, model.use_offset, h)
     nis = nu * nu / s
     inlier = LOG_INLIER - 0.5 * (nis + math.log(TWO_PI * s))
-    weight = 1.0
-    if model.soft_gate:
-        weight = 1.0 / (1.0 + math.exp(min(LOG_OUTLIER_HEADING - inlier, 50.0)))
-        ok = weight > 0.5
-    else:
-        ok = nis <= model.heading_gate
+    weight, ok = _judged(inlier, LOG_OUTLIER_HEADING, nis, model.heading_gate, model.soft_gate)
     out.heading_nu[h] = nu
     out.heading_var[h] = s
     out.heading_ok[h] = ok
@@ -205,12 +209,7 @@ def _take_fix(
     rest_n = nu_n - ratio * nu_e
     nis = nu_e * nu_e / see + rest_n * rest_n / s_n
     inlier = LOG_INLIER - 0.5 * (nis + math.log(see * s_n)) - math.log(TWO_PI)
-    weight = 1.0
-    if model.soft_gate:
-        weight = 1.0 / (1.0 + math.exp(min(LOG_OUTLIER_FIX - inlier, 50.0)))
-        ok = weight > 0.5
-    else:
-        ok = nis <= model.fix_gate
+    weight, ok = _judged(inlier, LOG_OUTLIER_FIX, nis, model.fix_gate, model.soft_gate)
     out.fix_nu[f, 0] = nu_e
     out.fix_nu[f, 1] = nu_n
     out.fix_var[f, 0] = see

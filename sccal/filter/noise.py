@@ -254,7 +254,7 @@ class Search:
         mode, found = iterate(problem, at, max_rounds=2, with_sigmas=False)
         fitted = At(Constants.of(mode), mode[4:], found if problem.extra else None)
         candidates = (at, fitted)
-        costs = [self._cost_at(timeline, logs, one)(logs) for one in candidates]
+        costs = [self.cost(timeline, logs, one) for one in candidates]
         better = int(np.argmin(costs))
         return costs[better], candidates[better]
 

@@ -13,14 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from sccal.align import Aligned, build_timeline
-from sccal.arrays import Floats, Ints
+from sccal.arrays import Floats
 from sccal.calibration.status import OFFSET_UNOBSERVED_RAD, UNOBSERVED_RATIO
 from sccal.calibration.unseen import STANDS_OUT
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.drive_shape import TURN_RAD
 from sccal.effects.effect import Effect
-from sccal.evidence.candidates import plain_forms
-from sccal.evidence.extension import Free, FreeEffects
+from sccal.evidence.confounding import SAME, correlation, reduced
+from sccal.evidence.extension import Free, FreeEffects, plain_forms
 from sccal.filter.iterate import RunProblem
 from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
@@ -39,8 +39,6 @@ GOOD_SHARE = 0.1
 """Of its prior's sigma: a constant known so well is shown, one known worse is shown weakly."""
 WEAK_SHARE = 0.25
 """Of an effect's prior: the noise of the heading passes for small turns, by which a straight line shows a little."""
-SAME = 0.98
-"""Canonical correlation from which on two effects are one."""
 NUISANCE = 0.5
 CORE = {
     "radii": ("wheel radii", "drive straights of 20 m and more, with fixes"),
@@ -126,14 +124,13 @@ def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
     """information (K, K) about all parameters, in units of their priors."""
     parameters = [one for effect in asked for one in Free(effect).parameters]
     prior = np.array([one.prior_sigma for one in parameters])
-    scaled = information
     small = NUISANCE * np.array([one.matters / one.prior_sigma if one.matters > 0 else 0.1 for one in parameters])
     bounds = np.cumsum([0, *(len(Free(effect).parameters) for effect in asked)])
     rows = {effect.name: np.arange(a, b) for effect, a, b in zip(asked, bounds[:-1], bounds[1:], strict=True)}
     found: list[tuple[Effect, Shown, Floats]] = []
     for effect in asked:
         own = rows[effect.name]
-        sigma = np.sqrt(np.diag(np.linalg.inv(_reduced(scaled, own, small) + np.eye(own.size))))
+        sigma = np.sqrt(np.diag(np.linalg.inv(reduced(information, own, small) + np.eye(own.size))))
         least = np.array([one.matters / one.prior_sigma for one in Free(effect).parameters]) + STANDS_OUT * sigma
         shown: Shown = "yes" if (least <= 1.0).all() else "weak" if (sigma <= WEAK_SHARE).any() else "no"
         found.append((effect, shown, sigma * prior[own]))
@@ -141,7 +138,7 @@ def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
     same: dict[str, list[str]] = {name: [] for name in rows}
     for k, one in enumerate(seen):
         for other in seen[k + 1 :]:
-            if _correlation(scaled, rows[one], rows[other], small) > SAME:
+            if correlation(information, rows[one], rows[other], small) > SAME:
                 same[one].append(other)
                 same[other].append(one)
     excited = []
@@ -160,25 +157,6 @@ def _effects(asked: Sequence[Effect], information: Floats) -> list[Excited]:
             )
         )
     return excited
-
-
-def _reduced(information: Floats, kept: Ints, small: Floats) -> Floats:
-    """Information (k, k) about some parameters with small amounts of all others allowed; in units of the priors."""
-    others = np.setdiff1d(np.arange(small.size), kept)
-    inner = information[np.ix_(others, others)] + np.diag(1.0 / small[others] ** 2)
-    cross = information[np.ix_(kept, others)]
-    return np.asarray(information[np.ix_(kept, kept)] - cross @ np.linalg.solve(inner, cross.T))
-
-
-def _correlation(information: Floats, one: Ints, other: Ints, small: Floats) -> float:
-    """Largest canonical correlation of two effects' columns."""
-    reduced = _reduced(information, np.concatenate((one, other)), small)
-    a, ab, b = reduced[: one.size, : one.size], reduced[: one.size, one.size :], reduced[one.size :, one.size :]
-    try:
-        left, right = np.linalg.cholesky(a), np.linalg.cholesky(b)
-    except np.linalg.LinAlgError:
-        return 0.0
-    return float(np.linalg.svd(np.linalg.solve(left, np.linalg.solve(right, ab.T).T), compute_uv=False).max())
 
 
 _RULES: dict[str, Callable[[DriveFacts], bool]] = {

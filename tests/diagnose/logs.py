@@ -12,7 +12,6 @@ import numpy as np
 from sccal.align import Aligned, align
 from sccal.arrays import Floats
 from sccal.calibration.options import CalibrationOptions
-from sccal.diagnose.criteria import PRICE_NATS
 from sccal.diagnose.diagnose import diagnose
 from sccal.diagnose.result import Diagnosis
 from sccal.diagnose.shapes import best_forms
@@ -21,6 +20,7 @@ from sccal.effects.effect import Effect
 from sccal.evidence.candidates import Candidates, gather_candidates
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted
+from sccal.evidence.posterior import PRICE_NATS
 from sccal.evidence.saturated import Saturated, saturate
 from sccal.simulate.choose import settings_from
 from sccal.simulate.physics import Physics

@@ -12,8 +12,8 @@ from sccal.align import Series
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.logged import logged_effects
 from sccal.effects.view import DriveView
-from sccal.evidence.candidates import gather_candidates, named_candidates, plain_form, plain_forms, without_shadows
-from sccal.evidence.extension import Free
+from sccal.evidence.candidates import gather_candidates, named_candidates, without_shadows
+from sccal.evidence.extension import Free, plain_form, plain_forms
 from tests.effects.harness import injected
 
 WHERE = ("heading", "along", "yaw", "side", "pull")

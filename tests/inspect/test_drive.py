@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from sccal.inspect.excitation import _reduced
+from sccal.evidence.confounding import reduced
 from tests.inspect.conftest import REVERSES_M, STANDS_S
 from tests.inspect.logs import copied, inspected, rows, said, shown, witness
 from tests.runs import written
@@ -110,7 +110,7 @@ def test_marginalising_is_inverting_all_and_taking_a_part():
     whole = information.copy()
     whole[others, others] += 1.0 / small[others] ** 2
     expected = np.linalg.inv(np.linalg.inv(whole)[np.ix_(kept, kept)])
-    np.testing.assert_allclose(_reduced(information, kept, small), expected, rtol=1e-9)
+    np.testing.assert_allclose(reduced(information, kept, small), expected, rtol=1e-9)
 
 
 # Signs
