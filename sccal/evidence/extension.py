@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -34,14 +35,14 @@ class Free:
     prior_scale: float = 1.0
     """Factor on the priors: below one for an effect that is in the model only because every log has a little of it."""
 
-    @property
+    @cached_property
     def key(self) -> str:
         """The effect's name, with its shapes where it has any: "hard_iron(tau_s=8)"."""
         if not self.shapes:
             return self.effect.name
         return f"{self.effect.name}({', '.join(f'{name}={value:.6g}' for name, value in self.shapes.items())})"
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Those that are estimated."""
         return tuple(one for one in self.effect.parameters if not one.shape)
@@ -87,7 +88,7 @@ class FreeEffects:
         """Every free parameter with its effect, as the filter holds them."""
         return tuple((free.effect, parameter) for free in self.effects for parameter in free.parameters)
 
-    @property
+    @cached_property
     def prior_sigmas(self) -> Floats:
         """(m,) about zero, in file units."""
         return np.array([free.prior_scale * one.prior_sigma for free in self.effects for one in free.parameters])

@@ -8,6 +8,7 @@ posterior mode (as in the iterated Kalman filter, Bell and Cathey 1993).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -67,17 +68,17 @@ class RunProblem:
     options: FilterOptions
     extension: Extension | None = None
 
-    @property
+    @cached_property
     def centre(self) -> Constants:
         """The middle of the constants' priors."""
         return first_constants(self.aligned, self.start)
 
-    @property
+    @cached_property
     def prior_mean(self) -> Floats:
         """(3 + m,) R_r, R_l, L and the extension's parameters."""
         return np.concatenate((self.centre.as_array(), np.zeros(self.extra)))
 
-    @property
+    @cached_property
     def prior(self) -> Floats:
         """Covariance of the same (3 + m, 3 + m)."""
         covariance = np.zeros((3 + self.extra, 3 + self.extra))
