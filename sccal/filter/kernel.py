@@ -79,7 +79,7 @@ from sccal.filter.layout import (
     X,
     Y,
 )
-from sccal.filter.measurement import TWO_PI, clamp, dot, expect_fix, expect_heading, learn, learn_fix, times
+from sccal.filter.measurement import TWO_PI, clamp, dot, dot_row, expect_fix, expect_heading, learn, learn_fix, times
 from sccal.filter.motion import decay, move
 
 OUTLIER_FRACTION = 0.01
@@ -258,7 +258,7 @@ def _write(belief: Belief, row: int, out: Output) -> None:
         variance = belief.core[i, i]
         for k in range(m):
             if slope[k] != 0.0:
-                variance += slope[k] * dot(belief.params[k], slope, m)
+                variance += slope[k] * dot_row(belief.params, k, slope, m)
         out.sigma[row, i] = math.sqrt(max(variance, 0.0))
 
 

@@ -47,9 +47,8 @@ def expect_heading(
     for i in range(BASE_STATES):
         v[i] = turns * P[THETA, i] + P[HEADING_BIAS, i] + ofs * P[OFFSET, i]
     s_core = events.yaw_var_rad2[h] + turns * v[THETA] + v[HEADING_BIAS] + ofs * v[OFFSET]
-    V2, V6, V7 = V[THETA], V[OFFSET], V[HEADING_BIAS]
     for k in range(m):
-        g[k] = turns * V2[k] + V7[k] + ofs * V6[k]
+        g[k] = turns * V[THETA, k] + V[HEADING_BIAS, k] + ofs * V[OFFSET, k]
     for k in range(columns.heading_param.shape[0]):
         c = columns.heading[h, k]
         j = columns.heading_param[k]
@@ -105,10 +104,9 @@ def expect_fix(
     for i in range(BASE_STATES):
         v[i] = P[X, i] - arm_n * P[THETA, i] + P[EAST_BIAS, i]
         w[i] = P[Y, i] + arm_e * P[THETA, i] + P[NORTH_BIAS, i]
-    V0, V1, V2, V8, V9 = V[X], V[Y], V[THETA], V[EAST_BIAS], V[NORTH_BIAS]
     for k in range(m):
-        g_e[k] = V0[k] - arm_n * V2[k] + V8[k]
-        g_n[k] = V1[k] + arm_e * V2[k] + V9[k]
+        g_e[k] = V[X, k] - arm_n * V[THETA, k] + V[EAST_BIAS, k]
+        g_n[k] = V[Y, k] + arm_e * V[THETA, k] + V[NORTH_BIAS, k]
     for k in range(columns.fix_param.shape[0]):
         j = columns.fix_param[k]
         ce, cn = fix_row(columns.fix_port[k], columns.fix[f, k], ct, st)
@@ -127,9 +125,8 @@ def downdate(P: Floats, v: Floats, inv_s: float) -> None:
     for i in range(n):
         vi = v[i]
         if vi != 0.0:
-            row = P[i]
             for j in range(n):
-                row[j] -= (vi * v[j]) * inv_s
+                P[i, j] -= (vi * v[j]) * inv_s
 
 
 @compiled
@@ -141,23 +138,34 @@ def times(matrix: Floats, vector: Floats, result: Floats) -> None:
     for j in range(m):
         vj = vector[j]
         if vj != 0.0:
-            row = matrix[j]
             for k in range(m):
-                result[k] += vj * row[k]
+                result[k] += vj * matrix[j, k]
 
 
 @compiled
 def dot(a: Floats, b: Floats, count: int) -> float:
-    """Σ a b over the first ``count``, in four sums that do not wait for each other."""
+    """Σ a b over the first ``count``."""
+    total = 0.0
+    for k in range(count):
+        total += a[k] * b[k]
+    return total
+
+
+@compiled
+def dot_row(matrix: Floats, row: int, b: Floats, count: int) -> float:
+    """The same for one row of a matrix, in four sums that do not wait for each other.
+
+    A view of the row would be counted as a reference, which costs more than the products of a short one.
+    """
     s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
     whole = count - count % 4
     for k in range(0, whole, 4):
-        s0 += a[k] * b[k]
-        s1 += a[k + 1] * b[k + 1]
-        s2 += a[k + 2] * b[k + 2]
-        s3 += a[k + 3] * b[k + 3]
+        s0 += matrix[row, k] * b[k]
+        s1 += matrix[row, k + 1] * b[k + 1]
+        s2 += matrix[row, k + 2] * b[k + 2]
+        s3 += matrix[row, k + 3] * b[k + 3]
     for k in range(whole, count):
-        s0 += a[k] * b[k]
+        s0 += matrix[row, k] * b[k]
     return (s0 + s1) + (s2 + s3)
 
 
@@ -169,12 +177,11 @@ def learn(belief: Belief, v: Floats, s_core: float, g: Floats, q: Floats, s: flo
     gain = nu / s
     inv_core = 1.0 / s_core
     for i in range(BASE_STATES):
-        row = V[i]
-        x[i] += (v[i] + dot(row, q, m)) * gain
+        x[i] += (v[i] + dot_row(V, i, q, m)) * gain
         less = v[i] * inv_core
         if less != 0.0:
             for k in range(m):
-                row[k] -= less * g[k]
+                V[i, k] -= less * g[k]
     for k in range(m):
         p[k] += q[k] * gain
     downdate(P, v, inv_core)
@@ -212,18 +219,16 @@ def learn_fix(
     for k in range(m):
         q_n[k] -= ratio * q_e[k]
     for i in range(BASE_STATES):
-        row = V[i]
-        x[i] += (v[i] + dot(row, q_e, m)) * gain_e + (w[i] - ratio * v[i] + dot(row, q_n, m)) * gain_n
+        x[i] += (v[i] + dot_row(V, i, q_e, m)) * gain_e + (w[i] - ratio * v[i] + dot_row(V, i, q_n, m)) * gain_n
     for i in range(BASE_STATES):
         w[i] -= core_ratio * v[i]
     for k in range(m):
         p[k] += q_e[k] * gain_e + q_n[k] * gain_n
         g_n[k] -= core_ratio * g_e[k]
     for i in range(BASE_STATES):
-        row = V[i]
         less_e, less_n = v[i] * inv_e, w[i] * inv_n
         for k in range(m):
-            row[k] -= less_e * g_e[k] + less_n * g_n[k]
+            V[i, k] -= less_e * g_e[k] + less_n * g_n[k]
     downdate(P, v, inv_e)
     downdate(P, w, inv_n)
     downdate(belief.params, q_e, 1.0 / whole[0])

@@ -91,13 +91,12 @@ def move(
     gt4 = -left_clear * inv_at_track
     gt5 = -(at_right * right_clear - at_left * left_clear + more_right - more_left) * inv_at_track * inv_at_track
 
-    V0, V1, V2, V3, V4, V5 = V[X], V[Y], V[THETA], V[RADIUS_RIGHT], V[RADIUS_LEFT], V[TRACK]
     for q in range(m):
-        along_q = ds[q] + gs3 * V3[q] + gs4 * V4[q]
-        turn_q = dt[q] + gt3 * V3[q] + gt4 * V4[q] + gt5 * V5[q]
-        V0[q] += ax * V2[q] + cm * along_q - sm * dd[q] + hx * turn_q
-        V1[q] += ay * V2[q] + sm * along_q + cm * dd[q] + hy * turn_q
-        V2[q] += turn_q
+        along_q = ds[q] + gs3 * V[RADIUS_RIGHT, q] + gs4 * V[RADIUS_LEFT, q]
+        turn_q = dt[q] + gt3 * V[RADIUS_RIGHT, q] + gt4 * V[RADIUS_LEFT, q] + gt5 * V[TRACK, q]
+        V[X, q] += ax * V[THETA, q] + cm * along_q - sm * dd[q] + hx * turn_q
+        V[Y, q] += ay * V[THETA, q] + sm * along_q + cm * dd[q] + hy * turn_q
+        V[THETA, q] += turn_q
 
     # F differs from the identity in the three pose rows: left factor, right factor, mirror image.
     S, T = work[3], work[4]
