@@ -7,7 +7,7 @@ While the robot stands hardly anything is an event but the outputs (see standing
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from sccal.arrays import Floats, Ints, Rows
 
 LOOSE_FRACTION = 0.25
 LOOSE_FLOOR_M = 0.02
+RATIO_DIGITS = 4
+"""Of R_r/R_l: known so well, it leaves less turn in a straight line than slip does."""
+KEPT_RATIOS = 4
 ROUNDING = 0.1
 """Stamps of a 50 Hz stream rarely have a median step of exactly 0.02 s; a tenth of a step more is the same rate."""
 
@@ -40,6 +43,8 @@ class Timeline:
     """(h,) which of the aligned readings are used."""
     fix_index: Ints
     out_t_s: Floats
+    known_clear: dict[float, tuple[Floats, Floats]] = field(default_factory=dict, compare=False, repr=False)
+    """What clear_steps found last, by the ratio of the radii: every pass asks for it, and few ratios differ."""
 
 
 def thin(t_s: Floats, rate_hz: float) -> Ints:
@@ -98,7 +103,22 @@ def build_timeline(
 
 
 def clear_steps(aligned: Aligned, timeline: Timeline, right_over_left: float) -> tuple[Floats, Floats]:
-    """Right and left wheel angle from event to event (n,), without what is only slip (see denoise)."""
+    """Right and left wheel angle from event to event (n,), without what is only slip (see denoise).
+
+    The timeline must be one of the run. The ratio counts to its fourth digit.
+    """
+    ratio = round(right_over_left, RATIO_DIGITS)
+    known = timeline.known_clear
+    found = known.get(ratio)
+    if found is None:
+        found = _clear_steps(aligned, timeline, ratio)
+        for old in list(known)[: -(KEPT_RATIOS - 1)]:
+            known.pop(old, None)
+        known[ratio] = found
+    return found
+
+
+def _clear_steps(aligned: Aligned, timeline: Timeline, right_over_left: float) -> tuple[Floats, Floats]:
     first = max(int(np.searchsorted(aligned.wheel_t_s, timeline.t_s[0])) - 1, 0)
     last = int(np.searchsorted(aligned.wheel_t_s, timeline.t_s[-1])) + 1
     part = slice(first, last)

@@ -17,7 +17,7 @@ from sccal.diagnose.result import Picture
 from sccal.effects.effect import Column
 from sccal.effects.logged import LoggedColumn
 from sccal.effects.view import DriveView, Moments
-from sccal.evidence.extension import Free, view_run
+from sccal.evidence.extension import Free, FreeEffects, view_run
 from sccal.evidence.model import Model
 
 BINS = 24
@@ -200,8 +200,8 @@ def _window_residual(model: Model, run: int, edges: Floats, port: str) -> Floats
     view = view_run(problem, at, None)
     predicted_turn, predicted_along = view.steps.turn_rad.copy(), view.steps.along_m.copy()
     extension = problem.extension
-    if extension is not None:
-        for one in extension.placed(view, at.values):  # type: ignore[attr-defined]
+    if isinstance(extension, FreeEffects):
+        for one in extension.laid(view, at.values).placed:
             column = one.column
             size = float(at.values[one.parameter]) * column.values
             if column.port == "turn":

@@ -97,13 +97,14 @@ class Scan:
         self.view = view_run(self.problem, at, self.clear)
         extension = problem.extension
         self.effects = extension.effects if isinstance(extension, FreeEffects) else ()
+        self.laid = FreeEffects(self.effects).laid(self.view, at.values)
         self.base_nll, self.base = self._pass(self.problem, at)
 
     def _pass(self, problem: RunProblem, at: At) -> tuple[float, ForwardPass]:
         extension = problem.extension
         columns = None
         if isinstance(extension, FreeEffects):
-            columns = extension.columns_in(self.view, at.values, problem.timeline)
+            columns = extension.columns_in(self.view, at.values, problem.timeline, self.laid)
         found = problem.begun(at, True, self.clear, columns, with_sigmas=False).finish()
         return found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found), found
 

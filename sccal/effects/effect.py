@@ -83,6 +83,8 @@ class Effect(ABC):
     excited_by: str
     """What drive makes it visible, as advice: "turn both ways"."""
     reference: str
+    bends_heading: bool = False
+    """Whether its columns at the heading follow its own values or the robot's heading, as iron's do."""
     on_every_robot: bool = False
     """Whether every robot with a receiver has some of it, so that a drive that cannot show it is worth a word."""
     shown_against: Cause = "time"

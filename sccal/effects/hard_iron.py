@@ -43,6 +43,7 @@ class HardIron(Effect):
     reference = "NGA Pub. 226, Handbook of Magnetic Compass Adjustment: coefficients B and C"
     shown_against = "heading"
     search = "scale"
+    bends_heading = True
 
     def says(self, found: Mapping[str, Measured]) -> str:
         most = amplitude(found["cos_deg"], found["sin_deg"])

@@ -26,6 +26,7 @@ class HeadingScale(Effect):
     parameters = (Parameter("ratio", "1", 0.02, -0.2, 0.2, matters=0.001),)
     looks_like = "the heading offset runs away with every turn to one side, and comes back with turns to the other"
     excited_by = "turn many times to one side, with straights of 20 m before and after: circles, or spins in place"
+    bends_heading = True
     reference = "Titterton and Weston 2004, Strapdown Inertial Navigation Technology: gyroscope scale factor"
 
     def says(self, found: Mapping[str, Measured]) -> str:

@@ -47,6 +47,7 @@ class SoftIron(Effect):
     reference = "NGA Pub. 226, Handbook of Magnetic Compass Adjustment: coefficients D and E"
     shown_against = "heading"
     search = "scale"
+    bends_heading = True
 
     def says(self, found: Mapping[str, Measured]) -> str:
         most = amplitude(found["cos2_deg"], found["sin2_deg"])

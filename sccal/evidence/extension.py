@@ -69,6 +69,57 @@ class Free:
 
 
 @dataclass(frozen=True)
+class Laid:
+    """Some effects laid out in a drive at some values of their parameters."""
+
+    view: DriveView
+    turned_rad: Floats | None
+    """How far the robot turned while each fix became old (f,); None where no fix is."""
+    count: int = 0
+    """Of effects."""
+    placed: tuple[Placed, ...] = ()
+    known_rad: Floats | float = 0.0
+    """Of the heading's readings (h,), beside the columns."""
+    slope: Floats | float = 0.0
+
+    def and_one(self, free: Free, values: Floats, first: int) -> Laid:
+        """With one more effect, its parameters (k,) numbered from ``first``."""
+        placed = free.placed(self.view, values.tolist(), first)
+        if self.turned_rad is not None and free.delay_s(self.view, values.tolist()) is None:
+            placed = _turned_back(placed, self.turned_rad)
+        if not free.effect.bends_heading or not values.any():
+            return replace(self, count=self.count + 1, placed=(*self.placed, *placed))
+        seen = self.view.headings
+        turned = replace(self.view, headings=replace(seen, yaw_rad=seen.yaw_rad + SMALL_RAD))
+        does = free.turns(self.view, values)
+        slope = (free.turns(turned, values) - does) / SMALL_RAD
+        here = [one for one in placed if one.column.port != "heading"]
+        known = does
+        for k, parameter in enumerate(free.parameters):
+            step = np.zeros(values.size)
+            step[k] = SMALL_SHARE * parameter.prior_sigma
+            change = free.turns(self.view, values + step) - free.turns(self.view, values - step)
+            here.append(Placed(first + k, Column(parameter.name, "heading", change / (2.0 * step[k]))))
+            known = known - values[k] * here[-1].column.values
+        return Laid(
+            self.view,
+            self.turned_rad,
+            self.count + 1,
+            (*self.placed, *here),
+            self.known_rad + known,
+            self.slope + slope,
+        )
+
+    def columns(self, timeline: Timeline) -> Columns:
+        """As the kernel takes them."""
+        if not isinstance(self.known_rad, np.ndarray) or not isinstance(self.slope, np.ndarray):
+            return kernel_columns(self.placed, timeline)
+        return kernel_columns(
+            self.placed, timeline, HeadingBend(self.known_rad, self.slope, self.view.headings.yaw_rad)
+        )
+
+
+@dataclass(frozen=True)
 class FreeEffects:
     """Some effects, their parameters free, in the order given: those of the vehicle before those of one run alone."""
 
@@ -97,61 +148,29 @@ class FreeEffects:
         """The kernel's columns, linearised at the given values along the given path."""
         return self.columns_in(view_run(problem, at, clear), at.values, problem.timeline)
 
-    def columns_in(self, view: DriveView, values: Floats, timeline: Timeline) -> Columns:
-        """The same for a drive that is seen already."""
-        derivatives, bend = self._bent(view, values, self.placed(view, values))
-        return kernel_columns(derivatives, timeline, bend)
+    def columns_in(self, view: DriveView, values: Floats, timeline: Timeline, known: Laid | None = None) -> Columns:
+        """The same for a drive that is seen already.
 
-    def _bent(
-        self, view: DriveView, values: Floats, placed: Sequence[Placed]
-    ) -> tuple[Sequence[Placed], HeadingBend | None]:
-        """Columns at the heading as derivatives at the given values, and what makes the whole exact there.
-
-        With D(p, ψ) what an effect does to the reading, and c = ∂D/∂p: D(p₀, ψ₀) − c p₀ is known, and ∂D/∂ψ is how much
-        more than by itself the reading turns with the robot. Secants, which the effects give, are D over p.
+        ``known`` are the first of these effects, laid out in the same view at the same values.
         """
-        first, bent = 0, False
-        known, slope = np.zeros(view.headings.t_s.size), np.zeros(view.headings.t_s.size)
-        derivatives = {(one.parameter, one.column.port): one for one in placed}
-        others = [one for one in placed if one.column.port != "heading"]
-        turned = replace(view, headings=replace(view.headings, yaw_rad=view.headings.yaw_rad + SMALL_RAD))
-        for free in self.effects:
-            size = len(free.parameters)
-            at = values[first : first + size]
-            here = [derivatives.get((first + k, "heading")) for k in range(size)]
-            if any(one is not None for one in here) and at.any():
-                does = free.turns(view, at)
-                more = (free.turns(turned, at) - does) / SMALL_RAD
-                by_parameter = np.zeros((size, does.size))
-                for k, parameter in enumerate(free.parameters):
-                    step = SMALL_SHARE * parameter.prior_sigma * np.eye(size)[k]
-                    by_parameter[k] = (free.turns(view, at + step) - free.turns(view, at - step)) / (2.0 * step[k])
-                known += does - at @ by_parameter
-                slope += more
-                bent = True
-                here = [
-                    Placed(first + k, Column(p.name, "heading", by_parameter[k])) for k, p in enumerate(free.parameters)
-                ]
-            others += [one for one in here if one is not None]
-            first += size
-        if not bent:
-            return placed, None
-        return others, HeadingBend(known, slope, view.headings.yaw_rad)
+        return self.laid(view, values, known).columns(timeline)
 
-    def placed(self, view: DriveView, values: Floats) -> list[Placed]:
-        """All columns made at the given values (m,); where fixes are old, arms turn with the robot meanwhile."""
-        placed: list[Placed] = []
-        turned = self._turned_rad(view, values)
-        first = 0
-        for free in self.effects:
+    def laid(self, view: DriveView, values: Floats, known: Laid | None = None) -> Laid:
+        """All effects laid out at some values (m,); where fixes are old, arms turn with the robot meanwhile.
+
+        Columns at the heading are derivatives at the values, beside what makes the whole exact there. With D(p, ψ) what
+        an effect does to the reading, and c = ∂D/∂p: D(p₀, ψ₀) − c p₀ is known, and ∂D/∂ψ is how much more than by
+        itself the reading turns with the robot. Secants, which the effects give, are D over p.
+        """
+        found = Laid(view, self._turned_rad(view, values))
+        if known is not None and found.turned_rad is known.turned_rad is None:
+            found = known
+        first = sum(len(free.parameters) for free in self.effects[: found.count])
+        for free in self.effects[found.count :]:
             last = first + len(free.parameters)
-            mine = values[first:last].tolist()
-            columns = free.placed(view, mine, first)
-            if turned is not None and free.delay_s(view, mine) is None:
-                columns = _turned_back(columns, turned)
-            placed += columns
+            found = found.and_one(free, values[first:last], first)
             first = last
-        return placed
+        return found
 
     def _turned_rad(self, view: DriveView, values: Floats) -> Floats | None:
         """How far the robot turned between what each fix shows and its stamp (f,); None where no fix is old."""

@@ -29,8 +29,6 @@ WORSE_NATS, MOST_HALVINGS = 3.0, 5
 """A step after which the data are less likely by more than what linearising elsewhere changes is halved, so often."""
 TURNS_THE_START_RAD = np.radians(1.0)
 """Effects that turn the heading by less while the robot sets off are within the start's own sigma."""
-SAME_RATIO = 1e-4
-"""R_r/R_l known so well leaves less turn in a straight line than slip does."""
 
 
 @dataclass(frozen=True)
@@ -125,12 +123,13 @@ class RunProblem:
         linearise_there: bool = False,
         clear: tuple[Floats, Floats] | None = None,
         columns: Columns | None = None,
+        start: Start | None = None,
         with_sigmas: bool = True,
     ) -> Filter:
         """A filter at the first event, its priors around the given values.
 
-        ``clear`` and ``columns`` spare their computation where they are known already; without sigmas the outputs hold
-        states alone, which spares much where there are many effects.
+        ``clear``, ``columns`` and ``start`` (from ``start_given``) spare their computation where they are known
+        already; without sigmas the outputs hold states alone, which spares much where there are many effects.
         """
         clear = self.clear_steps(at.constants) if clear is None else clear
         columns = self.columns(at, clear) if columns is None else columns
@@ -146,7 +145,8 @@ class RunProblem:
             self.extra,
             with_sigmas,
         )
-        run.begin(self.start_given(columns, at.values), at.constants, self.prior, at.values)
+        start = self.start_given(columns, at.values) if start is None else start
+        run.begin(start, at.constants, self.prior, at.values)
         return run
 
 
@@ -162,14 +162,11 @@ def iterate(
     lower, upper = numeric_limits(problem.centre)
     learnt = np.r_[0:3, 4 : 4 + problem.extra]
     at = At(Constants.of(np.clip(first.constants.as_array(), lower, upper)), first.values, first.path)
-    clear, ratio = None, np.inf
     best: tuple[float, At, ForwardPass, Floats] | None = None
     halvings = 0
     for _ in range(max_rounds + MOST_HALVINGS):
         theta = np.concatenate((at.constants.as_array(), at.values))
-        if clear is None or abs(theta[0] / theta[1] - ratio) > SAME_RATIO:
-            clear, ratio = problem.clear_steps(at.constants), float(theta[0] / theta[1])
-        found = problem.begun(at, True, clear, with_sigmas=with_sigmas).finish()
+        found = problem.begun(at, True, with_sigmas=with_sigmas).finish()
         cost = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found)
         if best is not None and not cost < best[0] + WORSE_NATS:
             # The step went too far: half of it, from where the data were likeliest.

@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Protocol, TypeVar
 
@@ -168,19 +168,6 @@ def misfit_timeline(aligned: Aligned) -> Timeline:
     return build_timeline(aligned, MISFIT_PATH_HZ, heading_hz, fix_hz, wheel_rate_hz=wheel_hz)
 
 
-@dataclass(frozen=True)
-class _Remembering(RunProblem):
-    """Clear steps depend on the timeline and the ratio of the radii only, and the search comes back to both."""
-
-    known_steps: dict[tuple[int, float], tuple[Floats, Floats]] = field(default_factory=dict)
-
-    def clear_steps(self, constants: Constants) -> tuple[Floats, Floats]:
-        key = (id(self.timeline), constants.radius_right_m / constants.radius_left_m)
-        if key not in self.known_steps:
-            self.known_steps[key] = super().clear_steps(constants)
-        return self.known_steps[key]
-
-
 class Search:
     """Negative log-posterior of the noise levels' logarithms for one run, and the way to its least."""
 
@@ -191,7 +178,6 @@ class Search:
         self.fix_sigma_m = float(np.median(np.sqrt(aligned.fix_var_east_m2[aligned.fix_leading])))
         self.levels = Levels.of(self.fix_sigma_m, aligned.yaw_floor_rad, options.with_offset)
         self.others = _other_scales(aligned, start)
-        self.known_steps: dict[tuple[int, float], tuple[Floats, Floats]] = {}
 
     def timelines(self, heading_rate_hz: float) -> tuple[Timeline, Timeline]:
         """The thinned log and the full one, over the stretch that shows the noise."""
@@ -209,8 +195,7 @@ class Search:
 
     def problem(self, timeline: Timeline, logs: Floats) -> RunProblem:
         """The run under some noise."""
-        noise = self.noise(logs)
-        return _Remembering(self.aligned, timeline, self.start, noise, self.options, self.extension, self.known_steps)
+        return RunProblem(self.aligned, timeline, self.start, self.noise(logs), self.options, self.extension)
 
     def points(self) -> list[Floats]:
         """Low-discrepancy points all over the prior."""
@@ -279,10 +264,11 @@ class Search:
         problem = self.problem(timeline, logs)
         clear = problem.clear_steps(at.constants)
         columns = problem.columns(at, clear)
+        start = problem.start_given(columns, at.values)
 
         def cost(level: Floats) -> float:
             problem = self.problem(timeline, level)
-            found = problem.begun(at, True, clear, columns, with_sigmas=False).finish()
+            found = problem.begun(at, True, clear, columns, start, with_sigmas=False).finish()
             value = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found) + self.levels.price(level)
             return value if np.isfinite(value) else 1e12
 

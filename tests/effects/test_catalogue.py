@@ -6,6 +6,8 @@ double; if it stood at the wrong port, it would stay.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -122,6 +124,23 @@ def test_columns_have_the_rows_of_their_port(name):
         assert np.all(np.isfinite(column.values))
         seen.add(column.parameter)
     assert seen == parameters
+
+
+@each_case
+def test_it_says_whether_its_columns_at_the_heading_follow_the_heading_and_its_values(name, truth):
+    view, effect = injected("turn_slip", (0.0,)).view, CATALOGUE[name]
+    turned = replace(view, headings=replace(view.headings, yaw_rad=1.01 * view.headings.yaw_rad + 0.1))
+    values = named(name, truth)
+    free = {one.name for one in effect.parameters if not one.shape}
+    doubled = {key: 2.0 * value if key in free else value for key, value in values.items()}
+
+    def at_the_heading(seen, at):
+        return [column.values for column in effect.columns(seen, at) if column.port == "heading"]
+
+    here = at_the_heading(view, values)
+    others = [at_the_heading(turned, values), at_the_heading(view, doubled)]
+    follows = any(not np.array_equal(a, b) for other in others for a, b in zip(here, other, strict=True))
+    assert follows == effect.bends_heading
 
 
 @each_effect
