@@ -33,7 +33,7 @@ class SavedEffect:
     run: str = ""
     """The run that it belongs to alone; empty for an effect of all runs."""
     told: bool = True
-    """False for an effect too small to matter, which the model holds because the data show it."""
+    """False for an effect too small to matter or too unsure to be told, which the model holds because it helps."""
     prior_scale: float = 1.0
     column: Range | None = None
     """Of an effect that follows a logged column: where its values lie over all runs, which its numbers refer to."""

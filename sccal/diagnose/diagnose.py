@@ -26,7 +26,7 @@ from sccal.diagnose.criteria import (
     LEAST_NATS,
 )
 from sccal.diagnose.excitation import excitation
-from sccal.diagnose.loop import Loop, Sized, run_loop, values_in
+from sccal.diagnose.loop import Loop, Sized, need_more, run_loop, values_in
 from sccal.diagnose.picture import picture_of
 from sccal.diagnose.result import (
     Diagnosis,
@@ -83,6 +83,7 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     if loop.model.fit.misfit > CONTRADICTED:
         loop = _more_trusted(loop, runs, options)
     placebo = _chance(loop, dressed, nonsense)
+    need_more(loop, placebo.highest_nats)
     before = judge(loop.first, options.outage_window_s)
     told = _steps(loop, before, options.outage_window_s)
     after = told[-1].after if told else _after(loop, before, options.outage_window_s)
@@ -138,7 +139,7 @@ def _chance(loop: Loop, dressed: Sequence[Aligned], nonsense: Sequence[NonsenseC
         tried=len(columns),
         passed=sum(gain >= LEAST_NATS for gain in gains),
         highest_nats=max(gains, default=0.0),
-        needed_nats=LEAST_NATS,
+        needed_nats=max(LEAST_NATS, *gains),
     )
 
 
@@ -147,12 +148,12 @@ def _steps(loop: Loop, before: Judged, window_s: float) -> list[_Told]:
     accepted: list[Accepted] = []
     steps: list[_Told] = []
     judged = before
-    last = max((k for k, one in enumerate(loop.sized) if one.size >= 1.0), default=-1)
+    last = max((k for k, one in enumerate(loop.sized) if one.told), default=-1)
     for number, one in enumerate(loop.sized):
         accepted.append(one.accepted)
-        if one.size < 1.0:
+        if not one.told:
             continue
-        # What is too small to be told comes in with the last finding, so that the last step ends at the model.
+        # What is not told comes in with the last finding, so that the last step ends at the model.
         model = loop.model if number == last else refitted(loop.model, accepted, reach=Reach.NEAR)
         after = judge(model, window_s)
         steps.append(_Told(one, _aliases(loop, one), judged, after))
@@ -317,7 +318,7 @@ def _saved(
                 units={each.name: each.unit for each in effect.parameters},
                 shapes=dict(accepted.free.shapes),
                 run="" if accepted.run is None else runs[accepted.run].name,
-                told=one.size >= 1.0,
+                told=one.told,
                 prior_scale=accepted.free.prior_scale,
                 column=effect.range if isinstance(effect, LoggedColumn) else None,
             )

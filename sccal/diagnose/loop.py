@@ -23,7 +23,7 @@ from sccal.evidence.joint import Key
 from sccal.evidence.model import Accepted, Model, Trust, bare_model, refitted
 from sccal.evidence.parallel import each
 from sccal.evidence.posterior import PRICE_NATS, Posterior
-from sccal.evidence.saturated import Saturated, saturate
+from sccal.evidence.saturated import Saturated, posterior_of, saturate
 from sccal.filter.levels import Noise
 from sccal.filter.noise import Reach
 from sccal.filter.options import FilterOptions
@@ -45,11 +45,22 @@ class Sized:
     t: float
     size: float
     """Largest parameter in units of the smallest that matters."""
+    needed_nats: float = LEAST_NATS
+    """What a finding must bring."""
 
     @property
-    def holds(self) -> bool:
-        """Whether it passes as a finding, whatever its size."""
-        return self.worth_nats >= LEAST_NATS and self.t >= LEAST_T and self.held_out_nats > 0.0
+    def told(self) -> bool:
+        """Whether it is a finding."""
+        sure = self.worth_nats >= self.needed_nats and self.t >= LEAST_T
+        return sure and self.size >= 1.0 and self.held_out_nats > 0.0
+
+    @property
+    def stays(self) -> bool:
+        """Whether the model is better off with it: more likely than not, and a help on data that did not fit it.
+
+        A moment, of which no other data can say anything, has to be a finding.
+        """
+        return self.told or (self.worth_nats > 0.0 and 0.0 < self.held_out_nats < np.inf)
 
 
 @dataclass
@@ -63,8 +74,6 @@ class Loop:
     moments: list[Found] = field(default_factory=list)
     shape_sigmas: dict[str, dict[str, float]] = field(default_factory=dict)
     """By effect (with its shapes, as refined): sigmas of the shapes."""
-    looked_beside: frozenset[str] | None = None
-    """Effects beside which moments and places were looked for last."""
     taken_back: dict[str, str] = field(default_factory=dict)
     """Effects that the evidence chose and that did not hold, and why."""
     sized: list[Sized] = field(default_factory=list)
@@ -98,19 +107,24 @@ def run_loop(
     saturated = saturate(first, competing, _prices(competing), Reach.ROUGH)
     loop = Loop(first, first, candidates, saturated)
     kept: list[Accepted] = []
-    for _ in range(MOST_ROUNDS):
+    for count in range(MOST_ROUNDS):
         before = {one.key for one in kept}
         kept = _chosen(loop, competing)
         loop.model = _refitted(loop, kept, Reach.LOOK)
-        kept, moments = _with_shapes(loop, kept)
-        if {one.key for one in kept} == before and not moments:
+        kept = _with_shapes(loop, kept)
+        at_rest = {one.key for one in kept} == before
+        moments = _moments(loop) if at_rest or count == 0 else []
+        if at_rest and not moments:
             break
         loop.moments += moments
         known = [*kept, *(one.accepted for one in loop.moments)]
         competing = [*best_forms(loop.model, candidates, kept), *(one for one in known if one.run is not None)]
         competing = list({one.key: one for one in competing}.values())
-        loop.saturated = saturate(loop.model, competing, _prices(competing), Reach.LOOK, _noises(loop.saturated))
-    loop.model = _refitted(loop, _chosen(loop, competing))
+        # The noise beside all candidates changes with a moment that is new among them, and hardly with anything else.
+        reach = Reach.LOOK if moments or count == 0 else None
+        loop.saturated = saturate(loop.model, competing, _prices(competing), reach, _noises(loop.saturated))
+    kept = _chosen(loop, competing)
+    loop.model = _refitted(loop, kept, Reach.LOOK)
     _take_back(loop)
     return loop
 
@@ -153,8 +167,8 @@ def _refitted(loop: Loop, kept: Sequence[Accepted], reach: Reach = Reach.NEAR) -
     return refitted(loop.saturated.model, kept, starts, reach, _noises(loop.saturated))
 
 
-def _with_shapes(loop: Loop, kept: list[Accepted]) -> tuple[list[Accepted], list[Found]]:
-    """Time constants and thresholds where they are likeliest, and the moments that stand out beside the model."""
+def _with_shapes(loop: Loop, kept: list[Accepted]) -> list[Accepted]:
+    """The same effects with their time constants and thresholds where they are likeliest."""
     new: list[Accepted] = []
     for one in kept:
         if one.free.shapes and one.run is None:
@@ -165,42 +179,62 @@ def _with_shapes(loop: Loop, kept: list[Accepted]) -> tuple[list[Accepted], list
             loop.shape_sigmas[new[-1].key] = sigmas
         else:
             new.append(one)
-    keys = frozenset(one.key for one in new)
-    if keys == loop.looked_beside or loop.model.trust is Trust.PATH:
-        return new, []
-    loop.looked_beside = keys
+    return new
+
+
+def _moments(loop: Loop) -> list[Found]:
+    """The moment or place that stands out most beside the model, where one does."""
+    if loop.model.trust is Trust.PATH:
+        return []
     known = [one.free.effect.name for one in loop.moments]
     of_runs = each(lambda run: find_moments(loop.model, run, known), range(len(loop.model.problems)))
     found = sorted((one for several in of_runs for one in several), key=lambda one: -one.gain_nats)
     for moment in found[:1]:
         loop.shape_sigmas[moment.free.key] = dict(moment.shape_sigmas)
-    return new, found[:1]
+    return found[:1]
 
 
 def _take_back(loop: Loop) -> None:
-    """Leave what does not hold once it is fitted; what is too small to be told may stay where it helps."""
+    """Leave what does not hold once it is fitted; what is too small or too unsure to be told may stay where it helps.
+
+    First under a noise that was looked at quickly, then under that of the model that is left.
+    """
+    reach = Reach.LOOK
     while True:
-        loop.sized = sized_of(loop.model, loop.posterior)
-        weak = [one for one in loop.sized if not (one.holds if one.size >= 1.0 else one.held_out_nats > 0.0)]
-        if not weak:
+        loop.sized = sized_of(loop.model)
+        weak = [one for one in loop.sized if not one.stays]
+        _tell_weak(loop, weak)
+        if not weak and reach is Reach.NEAR:
             return
         gone = {one.accepted.key for one in weak}
-        for one in weak:
-            if one.size >= 1.0:
-                loop.taken_back[one.accepted.free.effect.name] = _why(one)
-        loop.model = _refitted(loop, [one for one in loop.model.accepted if one.key not in gone])
+        reach = Reach.LOOK if weak else Reach.NEAR
+        loop.model = _refitted(loop, [one for one in loop.model.accepted if one.key not in gone], reach)
+
+
+def need_more(loop: Loop, needed_nats: float) -> None:
+    """Ask more of a finding, and take back what does not bring it."""
+    loop.sized = [replace(one, needed_nats=max(needed_nats, LEAST_NATS)) for one in loop.sized]
+    _tell_weak(loop, loop.sized)
+
+
+def _tell_weak(loop: Loop, some: Sequence[Sized]) -> None:
+    for one in some:
+        if one.size >= 1.0 and not one.told:
+            loop.taken_back[one.accepted.free.effect.name] = _why(one)
 
 
 def _why(one: Sized) -> str:
-    if one.worth_nats < LEAST_NATS:
-        return f"it brings {one.worth_nats:.1f} nats of evidence, and a finding needs {LEAST_NATS:.0f}"
+    kept = "; the model keeps it, as it helps on data that did not fit it" if one.stays else ""
+    if one.worth_nats < one.needed_nats:
+        return f"it brings {one.worth_nats:.1f} nats of evidence, and a finding needs {one.needed_nats:.1f}{kept}"
     if one.t < LEAST_T:
-        return f"it is {one.t:.1f} times its sigma, and a finding needs {LEAST_T:g}"
+        return f"it is {one.t:.1f} times its sigma, and a finding needs {LEAST_T:g}{kept}"
     return "it does not help on the data that did not fit it"
 
 
-def sized_of(model: Model, posterior: Posterior) -> list[Sized]:
+def sized_of(model: Model) -> list[Sized]:
     """What every effect of a model brings and how large it is."""
+    posterior = posterior_of(model, _prices(model.accepted))
     keys = [one.key for one in model.accepted]
     found = []
     for one in model.accepted:

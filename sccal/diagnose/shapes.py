@@ -15,12 +15,13 @@ import numpy as np
 
 from sccal.align import Timeline, build_timeline
 from sccal.arrays import Bools, Floats
-from sccal.diagnose.criteria import LEAST_NATS, SEARCH_NATS, SEARCH_T
+from sccal.diagnose.criteria import ALIKE_NATS, LEAST_NATS, SEARCH_NATS, SEARCH_T
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
 from sccal.evidence.candidates import Candidates
 from sccal.evidence.extension import Free, FreeEffects, view_run
 from sccal.evidence.model import Accepted, Model
+from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, prior_shift_nats
 from sccal.filter.layout import BASE_STATES
@@ -44,8 +45,6 @@ RADII_M = (1.5, 3.0, 6.0)
 PLACE_RADII = 1.0
 ORDINARY = 3.0
 """A find must stand out so many times above what any other moment of the run gains."""
-MOST_RUNS = 3
-"""As many runs choose between the forms of a candidate; all of them refine what is found."""
 AROUND = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)
 LEAST_TAU_SHARE = 0.02
 
@@ -172,7 +171,12 @@ def find_moments(model: Model, run: int, known: Sequence[str]) -> list[Found]:
 
 
 def best_forms(model: Model, candidates: Candidates, kept: Sequence[Accepted]) -> list[Accepted]:
-    """Every candidate in one form: as it is kept, else as it alone beside the model makes the runs most likely."""
+    """Every candidate in one form: as it is kept, else as it alone beside the model makes the runs most likely.
+
+    Where no form is clearly likelier than its first it keeps that. Nats of runs that contradict their noise count so
+    much less.
+    """
+    alike = ALIKE_NATS * max(model.fit.misfit, 1.0)
     mine = {one.free.effect.name: one for one in kept if one.run is None}
     scans: list[Scan] = []
     chosen = []
@@ -182,9 +186,9 @@ def best_forms(model: Model, candidates: Candidates, kept: Sequence[Accepted]) -
             continue
         best = forms[0]
         if len(forms) > 1:
-            scans = scans or [Scan(model.problems[k], model.at(k)) for k in range(min(len(model.problems), MOST_RUNS))]
+            scans = scans or each(lambda run: Scan(model.problems[run], model.at(run)), range(len(model.problems)))
             gains = [sum(scan.trial(free.effect, free.shapes, 1.0)[0] for scan in scans) for free in forms]
-            best = forms[int(np.argmax(gains))]
+            best = forms[int(np.argmax(gains))] if max(gains) - gains[0] > alike else best
         chosen.append(Accepted(best))
     return chosen
 

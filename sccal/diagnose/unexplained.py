@@ -1,7 +1,8 @@
 """What is left and has no name: the pattern that the residuals of the final model follow most, if they follow one.
 
 All patterns are free beside the model, noise included, so that an error that nothing in the catalogue explains can no
-longer pass for noise; the evidence then says what each pattern alone would bring. None of them enters the model.
+longer pass for noise; the evidence then says what each pattern alone would bring, and the strongest are fitted alone.
+None of them enters the model.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from sccal.diagnose.loop import Loop
 from sccal.diagnose.result import Unexplained
 from sccal.effects.patterns import PATTERNS, Pattern
 from sccal.evidence.extension import Free
-from sccal.evidence.model import Accepted, Model
-from sccal.evidence.posterior import PRICE_NATS, Posterior
-from sccal.evidence.saturated import saturate
+from sccal.evidence.model import Accepted, Model, refitted
+from sccal.evidence.posterior import PRICE_NATS
+from sccal.evidence.saturated import posterior_of, saturate
 from sccal.filter.noise import Reach
 
 WINDOW_S = 10.0
+MOST_TRIED = 4
+"""Patterns, the most likely first, that are fitted alone."""
 
 
 def unexplained(loop: Loop) -> Unexplained:
@@ -27,36 +30,39 @@ def unexplained(loop: Loop) -> Unexplained:
     kept = list(loop.model.accepted)
     patterns = {pattern.name: Accepted(Free(pattern)) for pattern in PATTERNS}
     full = saturate(loop.model, [*kept, *patterns.values()], dict.fromkeys(patterns, PRICE_NATS), Reach.LOOK)
-    posterior, keys = full.posterior, [one.key for one in kept]
-    within = [name for name in patterns if _is_within_bounds(posterior, [*keys, name], name, patterns[name].free)]
-    gains = {name: posterior.gain(name, keys) for name in within}
-    if not gains:
-        return Unexplained(False)
-    best = max(gains, key=lambda name: gains[name])
-    pattern = patterns[best].free.effect
+    keys = [one.key for one in kept]
+    gains = {name: full.posterior.gain(name, keys) for name in patterns}
+    strongest = sorted((name for name in gains if gains[name] >= PATTERN_NATS), key=lambda name: -gains[name])
+    for name in strongest[:MOST_TRIED]:
+        # Among all the others a pattern may have run away from where it is linear: what counts is what it is alone.
+        model = refitted(loop.model, [*kept, patterns[name]], reach=Reach.LOOK)
+        if found := _told(model, patterns[name], keys):
+            return found
+    return Unexplained(False)
+
+
+def _told(model: Model, accepted: Accepted, kept: list[str]) -> Unexplained | None:
+    """One pattern beside the final model, if it is what it seemed to be."""
+    name, pattern = accepted.key, accepted.free.effect
     assert isinstance(pattern, Pattern)
-    mean, _ = posterior.of(best, [*keys, best])
+    posterior = posterior_of(model, {name: PRICE_NATS})
+    gain = posterior.gain(name, kept)
+    mean, _ = posterior.of(name, [*kept, name])
+    values = mean * posterior.sigma[posterior.rows[name]]
     least = max(one.matters / one.prior_sigma for one in pattern.parameters)
-    if gains[best] < PATTERN_NATS or float(np.abs(mean).max()) < least:
-        return Unexplained(False)
-    values = mean * posterior.sigma[posterior.rows[best]]
-    fraction, size = variance_fraction(full.model, pattern, values)
+    low, high = (np.array([getattr(one, end) for one in accepted.free.parameters]) for end in ("lower", "upper"))
+    if gain < PATTERN_NATS or float(np.abs(mean).max()) < least or np.any(values < low) or np.any(values > high):
+        return None
+    fraction, size = variance_fraction(model, pattern, values)
     return Unexplained(
         significant=True,
         port=pattern.port,
         depends_on=pattern.depends_on,
         variance_fraction=fraction,
-        evidence_nats=gains[best],
-        t=posterior.t(best, [*keys, best]),
+        evidence_nats=gain,
+        t=posterior.t(name, [*kept, name]),
         size=size,
     )
-
-
-def _is_within_bounds(posterior: Posterior, kept: list[str], name: str, free: Free) -> bool:
-    """Whether a pattern beside the model stays where it can be a description: beyond, its fit has run away."""
-    values = posterior.of(name, kept)[0] * posterior.sigma[posterior.rows[name]]
-    low, high = (np.array([getattr(one, end) for one in free.parameters]) for end in ("lower", "upper"))
-    return bool(np.all((values > 0.25 * low) & (values < 0.25 * high)))
 
 
 def variance_fraction(model: Model, pattern: Pattern, values: Floats) -> tuple[float, str]:

@@ -9,13 +9,21 @@ up to a constant,
 
 and the values given that the rest is zero are J_KK⁻¹ h_K with the covariance J_KK⁻¹. Occam's price is in the
 determinant: a parameter that the data do not need costs what it could have done and did not.
+
+How much it could have done is known to a decade or two only: iron turns some compasses by thirty degrees and many by a
+tenth of one. So every effect's prior is a mixture of widths g Λ^½, evenly spread on a logarithmic scale from the
+smallest size that matters to the largest that is usual. With c the eigenvalues of an effect's C_AA in units of the
+widest prior, ν its mean along them and c_g = 1/(1/c + 1/g² − 1), the width g changes the evidence by
+
+    Σ ½ log(c_g/c) − log g + ½ ν² (c_g/c² − 1/c)
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,6 +37,24 @@ PRICE_NATS = 3.0
 effects compete, and a robot has two or three of them."""
 MOST_SWAPPED = 24
 """Exchanges are tried up to so many kept effects: beyond, a log that needs them all is not described by any."""
+
+
+WIDTHS = 6
+"""Of the priors: two a decade, from the smallest size that matters to the largest that is usual."""
+
+
+def wider_evidence(mean: Floats, covariance: Floats, widths: Floats) -> Floats:
+    """(n,) what a mixture of prior widths adds to the evidence for n effects, in nats.
+
+    ``mean`` (n, k) and ``covariance`` (n, k, k) are what the widest prior leaves, in its units; ``widths`` (n, w).
+    """
+    own, axes = np.linalg.eigh(covariance)
+    own = np.maximum(own, 1e-12)[:, None, :]
+    along = np.einsum("nik,ni->nk", axes, mean)[:, None, :]
+    narrow = 1.0 / (1.0 / own + (widths**-2.0 - 1.0)[:, :, None])
+    log = 0.5 * np.log(narrow / own) + 0.5 * along**2 * (narrow / own - 1.0) / own
+    each = log.sum(axis=2) - mean.shape[1] * np.log(widths)
+    return np.asarray(np.logaddexp.reduce(each, axis=1) - np.log(widths.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -45,6 +71,8 @@ class Posterior:
     """(G,) the priors' sigmas in file units (of the constants: their values)."""
     price_nats: Mapping[str, float]
     """What each effect must bring for being there at all: minus the logarithm of its prior odds."""
+    narrowest: Mapping[str, float] = field(default_factory=dict)
+    """Of each effect's priors, in parts of the widest; 1 where it is not named."""
 
     @cached_property
     def _information(self) -> tuple[Floats, Floats]:
@@ -58,7 +86,28 @@ class Posterior:
 
     def evidence(self, kept: Sequence[str]) -> float:
         """Logarithm of the evidence of keeping some effects and no others, over that of keeping none, prices paid."""
-        return self._evidence(self.places(kept)) - self._none - sum(self.price_nats.get(name, 0.0) for name in kept)
+        found = self._evidence(self.places(kept)) - self._none - sum(self.price_nats.get(name, 0.0) for name in kept)
+        return found + self._narrower(kept) if np.isfinite(found) else found
+
+    def _narrower(self, kept: Sequence[str]) -> float:
+        """What priors of all widths add to the evidence of the widest, each effect's beside the others' widest."""
+        named = [name for name in kept if self.narrowest.get(name, 1.0) < 1.0]
+        if not named:
+            return 0.0
+        mean, covariance = self.given(kept)
+        places = dict(zip(kept, self._within(kept), strict=True))
+        total = 0.0
+        for size in {places[name].size for name in named}:
+            same = [name for name in named if places[name].size == size]
+            rows = np.array([places[name] for name in same])
+            widths = np.array([self.narrowest[name] for name in same])[:, None] ** np.linspace(0.0, 1.0, WIDTHS)
+            total += float(wider_evidence(mean[rows], covariance[rows[:, :, None], rows[:, None, :]], widths).sum())
+        return total
+
+    def _within(self, kept: Sequence[str]) -> list[Ints]:
+        """Places of each kept effect's parameters among those of ``given``."""
+        ends = CONSTANTS + np.cumsum([0, *(self.rows[name].size for name in kept)])
+        return [np.arange(first, last) for first, last in pairwise(ends.tolist())]
 
     @cached_property
     def _none(self) -> float:

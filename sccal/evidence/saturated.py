@@ -77,4 +77,8 @@ def posterior_of(model: Model, price_nats: Mapping[str, float]) -> Posterior:
             rows.setdefault(effect, []).append(place)
     places: dict[str, Ints] = {key: np.array(some, dtype=np.int64) for key, some in rows.items()}
     covariance = fit.all_robust / np.outer(sigma, sigma)
-    return Posterior(places, fit.values / sigma, covariance, sigma, price_nats)
+    narrowest = {
+        one.key: min(1.0, *(each.matters / (one.free.prior_scale * each.prior_sigma) for each in one.free.parameters))
+        for one in model.accepted
+    }
+    return Posterior(places, fit.values / sigma, covariance, sigma, price_nats, narrowest)

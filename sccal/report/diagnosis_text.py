@@ -54,7 +54,7 @@ def diagnosis_text(d: Diagnosis, width: int = 100) -> str:
         *labelled("left", [unexplained_sentence(d.unexplained)], width),
         *labelled("alike", _cut(inseparable_lines(d), INSEPARABLE_SHOWN), width),
         *labelled("unseen", _cut(unseen_lines(d), ADVICE_SHOWN), width),
-        *labelled("back", [f"{name} was taken back: {why}" for name, why in d.taken_back.items()], width),
+        *labelled("back", [f"{name} was taken back as a finding: {why}" for name, why in d.taken_back.items()], width),
         *labelled("chance", [placebo_sentence(d)], width),
         *labelled("noise", [noise_line(d.noises)], width),
         *labelled("notices", notice_lines([("", notice) for notice in d.notices], JSON), width),
@@ -162,7 +162,7 @@ def placebo_sentence(d: Diagnosis) -> str:
         return "no nonsense column was tried, so how often chance passes is not known"
     passed = "none" if not d.placebo.passed else str(d.placebo.passed)
     return (
-        f"{passed} of {_count(d.placebo.tried, 'nonsense column')} passed the same test; the best has evidence of "
+        f"{passed} of {_count(d.placebo.tried, 'nonsense column')} passed the usual test; the best has evidence of "
         f"{_nats(d.placebo.highest_nats)}, a finding needs {_nats(d.placebo.needed_nats)}"
     )
 
@@ -197,7 +197,7 @@ def next_line(d: Diagnosis, runs: Sequence[str], model: str) -> str:
     if not d.model.effects:
         return f"next: sccal calibrate {where} (the model lacks nothing that these data show)"
     small = sum(not one.told for one in d.model.effects)
-    held = f" (the model holds {_count(small, 'effect')} too small to be told above)" if small else ""
+    held = f" (the model holds {_count(small, 'effect')} that is no finding above)" if small else ""
     return f"next: sccal calibrate {where} --model {shlex.quote(model)}{held}"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.evidence.posterior import CONSTANTS, Posterior
+from sccal.evidence.posterior import CONSTANTS, WIDTHS, Posterior
 
 
 class Problem:
@@ -63,6 +65,25 @@ def test_the_evidence_is_the_difference_of_the_marginal_likelihoods(effects, see
     posterior, none = problem.posterior(), problem.log_likelihood(())
     for kept in problem.every_subset():
         assert posterior.evidence(kept) == pytest.approx(problem.log_likelihood(kept) - none, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mixture_of_widths_is_the_mean_of_the_marginal_likelihoods(seed):
+    """For one effect beside others that keep their widest prior."""
+    problem = Problem(3, seed, size=0.3)
+    whole = problem.posterior()
+    mixed = replace(whole, narrowest={"e1": 0.01})
+    alone = replace(whole, narrowest={})
+    for kept in (("e1",), ("e0", "e1"), ("e0", "e1", "e2")):
+        likelihoods = []
+        for width in 0.01 ** np.linspace(0.0, 1.0, WIDTHS):
+            scaled = copy.copy(problem)
+            scaled.B = problem.B.copy()
+            scaled.B[:, problem.rows["e1"] - CONSTANTS] *= width
+            likelihoods.append(scaled.log_likelihood(kept))
+        expected = np.logaddexp.reduce(likelihoods) - np.log(WIDTHS) - problem.log_likelihood(())
+        assert mixed.evidence(kept) == pytest.approx(expected, abs=1e-6)
+        assert alone.evidence(kept) == pytest.approx(whole.evidence(kept))
 
 
 def test_every_kept_effect_costs_its_price():

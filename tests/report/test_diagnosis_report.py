@@ -367,10 +367,10 @@ def test_what_limits_the_answer_is_said() -> None:
     assert "unseen speed_slip, speed_field: drive at a second speed" in text
     assert "alike turn_scrub and side_slip: drive laps both ways at two speeds" in text
     assert (
-        "1 of 60 nonsense columns passed the same test; the best has evidence of 3.2 nats, a finding needs 6.4 nats"
+        "1 of 60 nonsense columns passed the usual test; the best has evidence of 3.2 nats, a finding needs 6.4 nats"
         in text
     )
-    assert "back slope was taken back: refitted it came out at 0.4" in text
+    assert "back slope was taken back as a finding: refitted it came out at 0.4" in text
     assert "fixes 1.0 … 1.2 x stated sigma" in text
     assert "found if" not in text
 
@@ -557,4 +557,4 @@ def test_the_next_command_is_told() -> None:
     assert next_line(NOTHING, ["runs"], "out/model.json").startswith("next: sccal calibrate runs (the model lacks")
     small = replace(TWO.model.effects[1], told=False)
     held = replace(TWO, model=replace(TWO.model, effects=(TWO.model.effects[0], small)))
-    assert "holds 1 effect too small to be told" in next_line(held, [], "out/model.json")
+    assert "holds 1 effect that is no finding" in next_line(held, [], "out/model.json")
