@@ -104,8 +104,8 @@ class Scan:
         columns = None
         if isinstance(extension, FreeEffects):
             columns = extension.columns_in(self.view, at.values, problem.timeline, self.laid)
-        found = problem.begun(at, True, self.clear, columns, with_sigmas=False).finish()
-        return found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found), found
+        found = problem.passed(at, self.clear, columns, with_sigmas=False)
+        return found.nll + prior_shift_nats(problem, at, found), found
 
     @property
     def suspicious(self) -> dict[str, tuple[Floats, Floats]]:

@@ -88,9 +88,9 @@ class RunLikelihood:
             so_far.append(_learnt(run.belief.covariance(), np.concatenate((run.belief.x, run.belief.p))))
         for before, after in pairwise(so_far):
             stretches.append(Stretch(after[0] - before[0], after[1] - before[1]))
-        found = run.finish()
+        found = problem.with_whole_prior(at, run.finish(), at.prior_scale)
         precision, vector = _learnt(found.final_covariance, found.final_state)
-        nll = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found)
+        nll = found.nll + prior_shift_nats(problem, at, found)
         return cls(precision - prior, vector - prior @ theta, found, nll, tuple(stretches))
 
 

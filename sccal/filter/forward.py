@@ -56,6 +56,15 @@ class ForwardPass:
     recoveries: int
     nll_heading: float
     nll_fix: float
+    prior_scale: float = 1.0
+    """Of the effects' priors within the pass; state, covariance and ``nll`` at its end are those of the whole ones."""
+    nll_prior: float = 0.0
+    """What the likelihood lacks because they were narrower."""
+
+    @property
+    def nll(self) -> float:
+        """Negative log-likelihood of all measurements."""
+        return self.nll_heading + self.nll_fix + self.nll_prior
 
 
 def say_if_compiling() -> None:

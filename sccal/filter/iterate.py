@@ -27,6 +27,8 @@ MAX_ROUNDS = 6
 CLOSE_SIGMAS = 0.05
 WORSE_NATS, MOST_HALVINGS = 3.0, 5
 """A step after which the data are less likely by more than what linearising elsewhere changes is halved, so often."""
+NARROW = 0.1
+"""Of the effects' priors: so narrow they are where a pass with the whole ones would leave the path."""
 TURNS_THE_START_RAD = np.radians(1.0)
 """Effects that turn the heading by less while the robot sets off are within the start's own sigma."""
 
@@ -40,6 +42,11 @@ class At:
     """Of the extension's parameters (m,)."""
     path: ForwardPass | None = None
     """An earlier pass, for what depends on where the robot was; None: the wheels along the AHRS yaw."""
+
+    @property
+    def prior_scale(self) -> float:
+        """Of the effects' priors within a pass from here: that of the earlier one."""
+        return 1.0 if self.path is None else self.path.prior_scale
 
 
 class Extension(Protocol):
@@ -90,6 +97,14 @@ class RunProblem:
         """Number of parameters beyond the paper's."""
         return 0 if self.extension is None else self.extension.prior_sigmas.size
 
+    def scaled_prior(self, scale: float) -> Floats:
+        """The prior (3 + m, 3 + m) with the effects' sigmas multiplied."""
+        if scale == 1.0:
+            return self.prior
+        factor = np.ones(3 + self.extra)
+        factor[3:] = scale
+        return np.asarray(self.prior * np.outer(factor, factor))
+
     def at_centre(self, constants: Constants | None = None) -> At:
         """The extension's parameters at zero."""
         return At(self.centre if constants is None else constants, np.zeros(self.extra))
@@ -125,6 +140,7 @@ class RunProblem:
         columns: Columns | None = None,
         start: Start | None = None,
         with_sigmas: bool = True,
+        prior_scale: float | None = None,
     ) -> Filter:
         """A filter at the first event, its priors around the given values.
 
@@ -146,8 +162,53 @@ class RunProblem:
             with_sigmas,
         )
         start = self.start_given(columns, at.values) if start is None else start
-        run.begin(start, at.constants, self.prior, at.values)
+        scale = at.prior_scale if prior_scale is None else prior_scale
+        run.begin(start, at.constants, self.scaled_prior(scale), at.values)
         return run
+
+    def passed(
+        self,
+        at: At,
+        clear: tuple[Floats, Floats] | None = None,
+        columns: Columns | None = None,
+        start: Start | None = None,
+        with_sigmas: bool = True,
+        prior_scale: float | None = None,
+    ) -> ForwardPass:
+        """A whole pass that starts and linearises there; see ``begun`` for the rest."""
+        scale = at.prior_scale if prior_scale is None else prior_scale
+        run = self.begun(at, True, clear, columns, start, with_sigmas, scale)
+        return self.with_whole_prior(at, run.finish(), scale)
+
+    def with_whole_prior(self, at: At, found: ForwardPass, scale: float) -> ForwardPass:
+        """A finished pass as if the effects' priors within it had not been narrower than they are.
+
+        Narrower ones keep a pass near the path along which it is linear: beside fifty wide ones the first minutes of a
+        log could be nearly anything, and a heading that is guessed wrong by half a turn stays wrong. What a prior
+        N(x*, s² Λ) about the start has done to a Gaussian posterior N(x* + e, C), the same about Λ undoes exactly:
+
+            C' = C − C (C − Λ s²/(1 − s²))⁻¹ C      e' = e − C (C − Λ s²/(1 − s²))⁻¹ e
+
+        for the effects and with them for all that hangs together with them, and the likelihood changes by
+        ½ log(|Λ| |C| / (|s² Λ| |C'|)) + ½ eᵀ C⁻¹ (e − e').
+        """
+        s = scale
+        if s == 1.0 or not self.extra:
+            return found
+        unit = np.sqrt(np.diag(self.prior))[3:]
+        state, covariance = found.final_state.copy(), found.final_covariance
+        own = slice(BASE_STATES, state.size)
+        inner = covariance[own, own] / np.outer(unit, unit)
+        moved = (state[own] - at.values) / unit
+        gain = np.linalg.solve(inner - np.eye(self.extra) * s**2 / (1.0 - s**2), covariance[:, own].T / unit[:, None]).T
+        state -= gain @ moved
+        covariance = covariance - gain @ (covariance[own, :] / unit[:, None])
+        covariance = 0.5 * (covariance + covariance.T)
+        left = (state[own] - at.values) / unit
+        wide = covariance[own, own] / np.outer(unit, unit)
+        logs = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(wide)[1] - 2.0 * self.extra * np.log(s)
+        shift = 0.5 * float(logs) + 0.5 * float(moved @ np.linalg.solve(inner, moved - left))
+        return replace(found, final_state=state, final_covariance=covariance, prior_scale=s, nll_prior=shift)
 
 
 def iterate(
@@ -164,10 +225,15 @@ def iterate(
     at = At(Constants.of(np.clip(first.constants.as_array(), lower, upper)), first.values, first.path)
     best: tuple[float, At, ForwardPass, Floats] | None = None
     halvings = 0
+    scale = 1.0
     for _ in range(max_rounds + MOST_HALVINGS):
         theta = np.concatenate((at.constants.as_array(), at.values))
-        found = problem.begun(at, True, with_sigmas=with_sigmas).finish()
-        cost = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found)
+        found = problem.passed(at, with_sigmas=with_sigmas, prior_scale=scale)
+        cost = found.nll + prior_shift_nats(problem, at, found)
+        if best is None and problem.extra:
+            narrow = problem.passed(at, with_sigmas=with_sigmas, prior_scale=NARROW)
+            if (other := narrow.nll + prior_shift_nats(problem, at, narrow)) < cost - WORSE_NATS:
+                found, cost, scale = narrow, other, NARROW
         if best is not None and not cost < best[0] + WORSE_NATS:
             # The step went too far: half of it, from where the data were likeliest.
             if halvings >= MOST_HALVINGS:

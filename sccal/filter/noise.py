@@ -268,8 +268,8 @@ class Search:
 
         def cost(level: Floats) -> float:
             problem = self.problem(timeline, level)
-            found = problem.begun(at, True, clear, columns, start, with_sigmas=False).finish()
-            value = found.nll_heading + found.nll_fix + prior_shift_nats(problem, at, found) + self.levels.price(level)
+            found = problem.passed(at, clear, columns, start, with_sigmas=False)
+            value = found.nll + prior_shift_nats(problem, at, found) + self.levels.price(level)
             return value if np.isfinite(value) else 1e12
 
         return cost
