@@ -96,7 +96,8 @@ def work(case: EffectCase, folder: Path) -> EffectResult:
         )
     log = folder / f"log-{case.seed}"
     simulated = write_log(scenario, log)
-    effects = sccal_adapter.as_told(scenario.effects, {column.name: column.reference for column in simulated.columns})
+    references = {column.name: column.reference for column in simulated.columns}
+    effects = sccal_adapter.as_told(scenario.effects, references, sccal_adapter.counted_from(log))
     diagnosed = sccal_adapter.diagnose(log, folder / "diagnosed")
     true_drift_m, drift_error = _true_model_drift(log, effects)
     return EffectResult(

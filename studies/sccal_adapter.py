@@ -105,24 +105,37 @@ def diagnose(folder: Path, out: Path) -> Diagnosed:
     return Diagnosed(findings, before.get("outage_end_rms_m"), after.get("outage_end_rms_m"), _origin(told, out))
 
 
-def as_told(effects: Effects, references: Mapping[str, float]) -> Effects:
-    """The true effects in sccal's own terms: its columns count from zero, the simulator's from a reference c₀.
+def counted_from(folder: Path) -> dict[str, float]:
+    """By further column of a log: the value from which sccal counts it."""
+    from sccal.align import align
+    from sccal.effects.logged import Range
+    from sccal.logs.run import discover, read_run
+
+    aligned = align(read_run(discover([folder])[0]))
+    return {name: Range.of([series]).reference for name, series in aligned.extras.items()}
+
+
+def as_told(effects: Effects, references: Mapping[str, float], counted: Mapping[str, float]) -> Effects:
+    """The true effects in sccal's own terms: it counts columns from r, the simulator from a reference c₀.
 
     A share of the motion that grows with a column makes another constant of the rest,
 
-        1 + p (c − c₀) = (1 − p c₀) (1 + p' c)      p' = p / (1 − p c₀)
+        1 + p (c − c₀) = (1 + p (r − c₀)) (1 + p' (c − r))      p' = p / (1 + p (r − c₀))
 
-    at the ports `along` and `yaw`. At `side` the rest is a constant angle between heading and way, tan α = p c₀, which
-    the heading's offset takes: p' = p cos² α, and a part of second order that no model has is left. Elsewhere p stays.
-    Should sccal count columns from their mean, c₀ here becomes the reference less that mean.
+    at the ports `along` and `yaw`. At `side` the rest is a constant angle between heading and way, tan α = p (r − c₀),
+    which the heading's offset takes: p' = p cos² α, and a part of second order that no model has is left. Elsewhere p
+    stays.
     """
     told = {name: dict(parameters) for name, parameters in effects.items()}
     for name, parameters in told.items():
         port, _, column = name.partition("~")
-        if port in ("along", "yaw") and column:
-            parameters[PER_UNIT] /= 1.0 - parameters[PER_UNIT] * references[column]
-        elif port == "side" and column:
-            parameters[PER_UNIT] /= 1.0 + (parameters[PER_UNIT] * references[column]) ** 2
+        if not column:
+            continue
+        away = parameters[PER_UNIT] * (counted.get(column, 0.0) - references[column])
+        if port in ("along", "yaw"):
+            parameters[PER_UNIT] /= 1.0 + away
+        elif port == "side":
+            parameters[PER_UNIT] /= 1.0 + away**2
     return told
 
 

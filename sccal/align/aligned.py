@@ -10,8 +10,10 @@ import numpy as np
 
 from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m, usable
 from sccal.align.agreement import check_agreement
+from sccal.align.clock_motion import MotionClock
 from sccal.align.clocks import Clock, require_overlap
 from sccal.align.digits import OF_ROUNDING, step_of
+from sccal.align.heading_clock import HeadingClock
 from sccal.align.one_clock import (
     fixes_by_motion,
     heading_by_turning,
@@ -30,6 +32,7 @@ from sccal.align.reference import (
     rounding_steps_m,
 )
 from sccal.align.signs import check_signs
+from sccal.align.smooth import without_white_noise
 from sccal.align.standing import Spans, dither_rad, moving_spans, standing_spans
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
@@ -37,7 +40,7 @@ from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.windows import Window, windows_on_clock, within
 
-__all__ = ["Aligned", "Series", "align", "yaw_to_enu"]
+__all__ = ["Aligned", "Moved", "Series", "align", "yaw_to_enu"]
 
 MIN_MEASUREMENTS = 10
 LONG_RUN_S = 2 * 86400.0
@@ -51,6 +54,15 @@ class Series:
 
     t_s: Floats
     values: Floats
+
+
+@dataclass(frozen=True)
+class Moved:
+    """By how much a stream's times were moved to where it goes together with the wheels."""
+
+    offset_s: float
+    """Added to its stamps."""
+    sigma_s: float
 
 
 @dataclass(frozen=True)
@@ -71,7 +83,7 @@ class Aligned:
     """AHRS reading turned into enu (h,), unwrapped."""
     yaw_sigma_rad: Floats | None
     pitch_rad: Floats | None
-    """Nose up, at the heading's times; None where the AHRS does not give it."""
+    """Nose up, at the heading's times, freed of white noise; None where the AHRS does not give it."""
     roll_rad: Floats | None
     fix_t_s: Floats
     fix_east_m: Floats
@@ -95,6 +107,8 @@ class Aligned:
     """Standard deviation of the rounding of the AHRS reading: its error is no smaller, whatever repeats."""
     fix_floor_m: tuple[float, float] = (0.0, 0.0)
     """The same of the fixes, east and north. The variances hold it; a factor that scales them must not go below it."""
+    moved: Mapping[str, Moved] = field(default_factory=dict)
+    """By stream ("headings", "fixes"): what was moved although it had stamps of the logging clock."""
 
     @cached_property
     def standing_s(self) -> Spans:
@@ -227,8 +241,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         heading_t_s=heading.t_s[seen],
         yaw_rad=_from_first(yaw[seen], read_rad[seen]),
         yaw_sigma_rad=None if heading.yaw_sigma_rad is None else _without_gaps(heading.yaw_sigma_rad[seen]),
-        pitch_rad=None if heading.pitch_rad is None else heading.pitch_rad[seen],
-        roll_rad=None if heading.roll_rad is None else heading.roll_rad[seen],
+        pitch_rad=None if heading.pitch_rad is None else without_white_noise(heading.pitch_rad[seen]),
+        roll_rad=None if heading.roll_rad is None else without_white_noise(heading.roll_rad[seen]),
         fix_t_s=t_s[good_index],
         fix_east_m=placed.east_m,
         fix_north_m=placed.north_m,
@@ -248,9 +262,19 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         heading_convention=heading.convention,
         yaw_floor_rad=OF_ROUNDING * step_of(heading.yaw_rad),
         fix_floor_m=(OF_ROUNDING * steps_m[0], OF_ROUNDING * steps_m[1]),
+        moved={} if one_clock else _moved(turned, compared.clock),
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))
+
+
+def _moved(heading: HeadingClock, fixes: MotionClock | None) -> dict[str, Moved]:
+    found = {}
+    if heading.offset_s != 0.0:
+        found["headings"] = Moved(heading.offset_s, heading.sigma_s)
+    if fixes is not None and fixes.fit is not None:
+        found["fixes"] = Moved(fixes.fit.offset_s, fixes.fit.sigma_offset_s)
+    return found
 
 
 def _offset_at_start_s(t_s: Floats, utc_s: Floats) -> float | None:

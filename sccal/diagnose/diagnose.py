@@ -27,6 +27,7 @@ from sccal.diagnose.criteria import (
 )
 from sccal.diagnose.excitation import excitation
 from sccal.diagnose.loop import Loop, Sized, need_more, run_loop, values_in
+from sccal.diagnose.moved import with_moved
 from sccal.diagnose.picture import picture_of
 from sccal.diagnose.result import (
     Diagnosis,
@@ -88,7 +89,7 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     told = _steps(loop, before, options.outage_window_s)
     after = told[-1].after if told else _after(loop, before, options.outage_window_s)
     sigmas = sigmas_beside_small(loop.model) if loop.model.accepted else {}
-    findings = tuple(_finding(loop, one, sigmas) for one in told)
+    findings = with_moved([_finding(loop, one, sigmas) for one in told], runs)
     hidden, detectable, inseparable = excitation(loop.posterior, loop.candidates, loop.kept, loop.saturated.model)
     parameters = _parameters(loop.model, runs)
     return Diagnosis(

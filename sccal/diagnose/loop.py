@@ -22,7 +22,7 @@ from sccal.evidence.held_out_gain import WHOLE_RUNS, held_out_gain
 from sccal.evidence.joint import Key
 from sccal.evidence.model import Accepted, Model, Trust, bare_model, refitted
 from sccal.evidence.parallel import each
-from sccal.evidence.posterior import PRICE_NATS, Posterior
+from sccal.evidence.posterior import PRICE_NATS, WIDEST, Posterior
 from sccal.evidence.saturated import Saturated, posterior_of, saturate
 from sccal.filter.levels import Noise
 from sccal.filter.noise import Reach
@@ -144,10 +144,10 @@ def _noises(saturated: Saturated) -> list[Noise]:
 
 def _chosen(loop: Loop, competing: Sequence[Accepted]) -> list[Accepted]:
     by_key = {one.key: one for one in competing}
-    return [
-        by_key[key]
-        for key in _in_order(loop.posterior, loop.posterior.select([key for key in loop.kept if key in by_key]))
-    ]
+    keys = _in_order(loop.posterior, loop.posterior.select([key for key in loop.kept if key in by_key]))
+    chosen = [by_key[key] for key in keys]
+    # What is in the model may be larger than usual.
+    return [replace(one, free=replace(one.free, prior_scale=WIDEST)) for one in chosen]
 
 
 def _in_order(posterior: Posterior, kept: Sequence[str]) -> list[str]:

@@ -75,6 +75,8 @@ class Finding:
     picture: Picture | None
     per_run: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     """Of each parameter that every run has its own of, in the order of the runs; ``parameters`` has their mean."""
+    aligned: bool = False
+    """Whether all of it was found, and put right, when the streams were brought onto one clock, before any fit."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from sccal.evidence.candidates import Candidates
 from sccal.evidence.extension import Free, FreeEffects, view_run
 from sccal.evidence.model import Accepted, Model
 from sccal.evidence.parallel import each
+from sccal.evidence.posterior import WIDEST
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, prior_shift_nats
 from sccal.filter.layout import BASE_STATES
@@ -39,8 +40,6 @@ APART_S = 12.0
 EDGE_S = 20.0
 """Nothing is looked for so near to the ends: a step there is a start."""
 ZOOMS, POINTS = 3, 7
-ANY_SIZE = 5.0
-"""Factor on the priors: a jump that the filter thinks impossible would be taken for outliers."""
 RADII_M = (1.5, 3.0, 6.0)
 PLACE_RADII = 1.0
 ORDINARY = 3.0
@@ -123,7 +122,7 @@ class Scan:
         self,
         effect: Effect,
         shapes: Mapping[str, float],
-        prior_scale: float = ANY_SIZE,
+        prior_scale: float = WIDEST,
         around: Floats | None = None,
     ) -> tuple[float, Floats, Floats]:
         """Gain in nats, values and sigmas of the effect's free parameters with its shapes as given.
@@ -340,7 +339,7 @@ def _with_place_errors(scan: Scan, found: Found) -> Found:
 def _found(scan: Scan, run: int, effect: Effect, shapes: Mapping[str, float], ordinary: float) -> list[Found]:
     gain, values, sigmas = scan.trial(effect, shapes)
     gain -= SEARCH_NATS + ORDINARY * ordinary
-    return [Found(run, Free(effect, dict(shapes), ANY_SIZE), values, sigmas, gain)] if gain > 0.0 else []
+    return [Found(run, Free(effect, dict(shapes), WIDEST), values, sigmas, gain)] if gain > 0.0 else []
 
 
 def _ordinary(gains: Floats) -> float:

@@ -63,6 +63,7 @@ class GnssLatency(Effect):
     excited_by = "drive at a second speed, or reverse 10 m: at one speed it is the same as a forward lever arm"
     reference = "Skog and Händel 2011, Time synchronization errors in loosely coupled GPS-aided inertial navigation"
     shown_against = "speed"
+    undone_for = "fixes"
 
     def says(self, found: Mapping[str, Measured]) -> str:
         when = "before" if found["s"].value > 0.0 else "after"

@@ -28,6 +28,7 @@ class HeadingLatency(Effect):
     looks_like = "the heading lags in every turn, the more the faster the turn, and is right again on the straight"
     excited_by = "spin in place both ways, at two turn rates"
     bends_heading = True
+    undone_for = "headings"
     reference = "Kelly and Sukhatme 2014, A general framework for temporal calibration of multiple sensors"
     shown_against = "turn_rate"
 

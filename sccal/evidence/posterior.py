@@ -12,8 +12,8 @@ determinant: a parameter that the data do not need costs what it could have done
 
 How much it could have done is known to a decade or two only: iron turns some compasses by thirty degrees and many by a
 tenth of one. So every effect's prior is a mixture of widths g Λ^½, evenly spread on a logarithmic scale from the
-smallest size that matters to the largest that is usual. With c the eigenvalues of an effect's C_AA in units of the
-widest prior, ν its mean along them and c_g = 1/(1/c + 1/g² − 1), the width g changes the evidence by
+smallest size that matters to five times what is usual. With c the eigenvalues of an effect's C_AA in units of the prior
+of the fit, ν its mean along them and c_g = 1/(1/c + 1/g² − 1), the width g changes the evidence by
 
     Σ ½ log(c_g/c) − log g + ½ ν² (c_g/c² − 1/c)
 """
@@ -39,14 +39,16 @@ MOST_SWAPPED = 24
 """Exchanges are tried up to so many kept effects: beyond, a log that needs them all is not described by any."""
 
 
-WIDTHS = 6
-"""Of the priors: two a decade, from the smallest size that matters to the largest that is usual."""
+WIDTHS = 8
+"""Of the priors: two a decade or more, from the smallest size that matters to the widest."""
+WIDEST = 5.0
+"""Times the usual size of an effect: what is in the model may be so large before its prior holds it back."""
 
 
-def wider_evidence(mean: Floats, covariance: Floats, widths: Floats) -> Floats:
+def mixture_evidence(mean: Floats, covariance: Floats, widths: Floats) -> Floats:
     """(n,) what a mixture of prior widths adds to the evidence for n effects, in nats.
 
-    ``mean`` (n, k) and ``covariance`` (n, k, k) are what the widest prior leaves, in its units; ``widths`` (n, w).
+    ``mean`` (n, k) and ``covariance`` (n, k, k) are what one prior leaves, in its units; ``widths`` (n, w).
     """
     own, axes = np.linalg.eigh(covariance)
     own = np.maximum(own, 1e-12)[:, None, :]
@@ -71,8 +73,8 @@ class Posterior:
     """(G,) the priors' sigmas in file units (of the constants: their values)."""
     price_nats: Mapping[str, float]
     """What each effect must bring for being there at all: minus the logarithm of its prior odds."""
-    narrowest: Mapping[str, float] = field(default_factory=dict)
-    """Of each effect's priors, in parts of the widest; 1 where it is not named."""
+    widths: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Of each effect's priors, narrowest and widest, in parts of that of the fit; none where it is not named."""
 
     @cached_property
     def _information(self) -> tuple[Floats, Floats]:
@@ -87,11 +89,11 @@ class Posterior:
     def evidence(self, kept: Sequence[str]) -> float:
         """Logarithm of the evidence of keeping some effects and no others, over that of keeping none, prices paid."""
         found = self._evidence(self.places(kept)) - self._none - sum(self.price_nats.get(name, 0.0) for name in kept)
-        return found + self._narrower(kept) if np.isfinite(found) else found
+        return found + self._mixed(kept) if np.isfinite(found) else found
 
-    def _narrower(self, kept: Sequence[str]) -> float:
-        """What priors of all widths add to the evidence of the widest, each effect's beside the others' widest."""
-        named = [name for name in kept if self.narrowest.get(name, 1.0) < 1.0]
+    def _mixed(self, kept: Sequence[str]) -> float:
+        """What priors of all widths add to the evidence of the fit's, each effect's beside the others as fitted."""
+        named = [name for name in kept if name in self.widths]
         if not named:
             return 0.0
         mean, covariance = self.given(kept)
@@ -100,8 +102,9 @@ class Posterior:
         for size in {places[name].size for name in named}:
             same = [name for name in named if places[name].size == size]
             rows = np.array([places[name] for name in same])
-            widths = np.array([self.narrowest[name] for name in same])[:, None] ** np.linspace(0.0, 1.0, WIDTHS)
-            total += float(wider_evidence(mean[rows], covariance[rows[:, :, None], rows[:, None, :]], widths).sum())
+            ends = np.log([self.widths[name] for name in same])
+            widths = np.exp(np.linspace(ends[:, 0], ends[:, 1], WIDTHS, axis=1))
+            total += float(mixture_evidence(mean[rows], covariance[rows[:, :, None], rows[:, None, :]], widths).sum())
         return total
 
     def _within(self, kept: Sequence[str]) -> list[Ints]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from sccal.arrays import Ints
 from sccal.effects.effect import Parameter
+from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model, refitted
-from sccal.evidence.posterior import Posterior
+from sccal.evidence.posterior import WIDEST, Posterior
 from sccal.filter.iterate import At
 from sccal.filter.levels import Noise
 from sccal.filter.noise import Reach
@@ -77,8 +78,11 @@ def posterior_of(model: Model, price_nats: Mapping[str, float]) -> Posterior:
             rows.setdefault(effect, []).append(place)
     places: dict[str, Ints] = {key: np.array(some, dtype=np.int64) for key, some in rows.items()}
     covariance = fit.all_robust / np.outer(sigma, sigma)
-    narrowest = {
-        one.key: min(1.0, *(each.matters / (one.free.prior_scale * each.prior_sigma) for each in one.free.parameters))
-        for one in model.accepted
-    }
-    return Posterior(places, fit.values / sigma, covariance, sigma, price_nats, narrowest)
+    widths = {one.key: _widths(one.free) for one in model.accepted}
+    return Posterior(places, fit.values / sigma, covariance, sigma, price_nats, widths)
+
+
+def _widths(free: Free) -> tuple[float, float]:
+    """Of an effect's priors, in parts of that of its fit."""
+    matters = min(one.matters / one.prior_sigma for one in free.parameters)
+    return min(matters if matters > 0.0 else 1.0, 1.0) / free.prior_scale, WIDEST / free.prior_scale

@@ -84,6 +84,8 @@ def cause_clause(finding: Finding) -> str:
 
 def brings_clause(d: Diagnosis) -> str:
     """What the findings bring where nothing was fitted."""
+    if all(one.aligned for one in d.findings):
+        return f"the stamps were put right before the fit, which lacks nothing else; {_drift_now(d.before)}"
     with_it = {1: "it", 2: "both"}.get(len(d.findings), "all of them")
     return f"with {with_it} {change_clause(d.before, d.after)}, {judged_by(d)}"
 
