@@ -19,7 +19,7 @@ from sccal.diagnose.criteria import ALIKE_NATS, LEAST_NATS, SEARCH_NATS, SEARCH_
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
 from sccal.evidence.candidates import Candidates
-from sccal.evidence.extension import Free, FreeEffects, view_run
+from sccal.evidence.extension import Free, FreeEffects, plain_form, view_run
 from sccal.evidence.model import Accepted, Model
 from sccal.evidence.parallel import each
 from sccal.evidence.posterior import WIDEST
@@ -193,7 +193,10 @@ def best_forms(model: Model, candidates: Candidates, kept: Sequence[Accepted]) -
 
 
 def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float]]:
-    """An effect of the model with its shapes where the likelihood of all runs is largest, and their sigmas."""
+    """An effect of the model with its shapes where the likelihood of all runs is largest, and their sigmas.
+
+    Where that is not clearly likelier than its plain form the shapes are those of that.
+    """
     scans = [_without(model, run, accepted) for run in range(len(model.problems))]
     shapes = dict(accepted.free.shapes)
     effect, scale = accepted.free.effect, accepted.free.prior_scale
@@ -219,6 +222,9 @@ def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float
             shapes[name] = float(points[int(np.argmax(gains))])
             reach *= 0.4
         sigmas[name] = _width(points, gains)
+    plain = plain_form(effect)
+    if plain is not None and gain(shapes) - gain(plain.shapes) <= ALIKE_NATS * max(model.fit.misfit, 1.0):
+        shapes = dict(plain.shapes)
     return replace(accepted, free=replace(accepted.free, shapes=shapes)), sigmas
 
 

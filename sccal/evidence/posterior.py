@@ -51,7 +51,8 @@ def mixture_evidence(mean: Floats, covariance: Floats, widths: Floats) -> Floats
     ``mean`` (n, k) and ``covariance`` (n, k, k) are what one prior leaves, in its units; ``widths`` (n, w).
     """
     own, axes = np.linalg.eigh(covariance)
-    own = np.maximum(own, 1e-12)[:, None, :]
+    # Disagreement of the data can make a sigma larger than the prior's, which then is all that is known.
+    own = np.clip(own, 1e-12, 1.0)[:, None, :]
     along = np.einsum("nik,ni->nk", axes, mean)[:, None, :]
     narrow = 1.0 / (1.0 / own + (widths**-2.0 - 1.0)[:, :, None])
     log = 0.5 * np.log(narrow / own) + 0.5 * along**2 * (narrow / own - 1.0) / own
@@ -165,27 +166,43 @@ class Posterior:
         return max(ends, key=self.evidence)
 
     def _thinned(self) -> list[str]:
-        """Everything, less what brings nothing, the most useless first."""
+        """Everything, less what brings nothing beside the rest as fitted, the most useless first."""
         kept = list(self.rows)
         while len(kept) > 1:
-            least = min(kept, key=lambda name: self.worth(name, kept))
-            if self.worth(least, kept) > 0.0:
+            worths = self._worths(kept)
+            least = int(np.argmin(worths))
+            if worths[least] > 0.0:
                 break
-            kept.remove(least)
+            del kept[least]
         return kept
 
+    def _worths(self, kept: Sequence[str]) -> list[float]:
+        """What each of the kept effects brings, the prior widths of the others left alone: from one inversion."""
+        mean, covariance = self.given(kept)
+        worths = []
+        for name, place in zip(kept, self._within(kept), strict=True):
+            own, block = mean[place], covariance[np.ix_(place, place)]
+            worth = 0.5 * float(own @ np.linalg.solve(block, own)) + 0.5 * float(np.linalg.slogdet(block)[1])
+            if name in self.widths:
+                widths = np.geomspace(*self.widths[name], WIDTHS)[None, :]
+                worth += float(mixture_evidence(own[None, :], block[None, :, :], widths)[0])
+            worths.append(worth - self.price_nats.get(name, 0.0))
+        return worths
+
     def _climbed(self, kept: list[str]) -> list[str]:
+        """One step up after another: an effect more or less, and where neither helps one exchanged for another."""
         best = self.evidence(kept)
         while True:
-            moves = [[one for one in kept if one != name] for name in kept]
             others = [name for name in self.rows if name not in kept]
-            moves += [[*kept, name] for name in others]
+            moves = [[one for one in kept if one != name] for name in kept] + [[*kept, name] for name in others]
+            swaps = []
             if len(kept) <= MOST_SWAPPED:
-                moves += [[*(one for one in kept if one != gone), name] for gone in kept for name in others]
-            if not moves:
+                swaps = [[*(one for one in kept if one != gone), name] for gone in kept for name in others]
+            for some in (moves, swaps):
+                values = [self.evidence(move) for move in some]
+                place = int(np.argmax(values)) if values else -1
+                if values and values[place] > best + 1e-9:
+                    best, kept = values[place], some[place]
+                    break
+            else:
                 return kept
-            values = [self.evidence(move) for move in moves]
-            place = int(np.argmax(values))
-            if values[place] <= best + 1e-9:
-                return kept
-            best, kept = values[place], moves[place]
