@@ -107,10 +107,12 @@ def run_loop(
     saturated = saturate(first, competing, _prices(competing), Reach.ROUGH)
     loop = Loop(first, first, candidates, saturated)
     kept: list[Accepted] = []
+    tried: list[tuple[Model, Saturated]] = []
     for count in range(MOST_ROUNDS):
         before = {one.key for one in kept}
         kept = _chosen(loop, competing)
-        loop.model = _refitted(loop, kept, Reach.LOOK)
+        loop.model = _refitted(loop, kept)
+        tried.append((loop.model, loop.saturated))
         kept = _with_shapes(loop, kept)
         at_rest = {one.key for one in kept} == before
         moments = _moments(loop) if at_rest or count == 0 else []
@@ -123,10 +125,18 @@ def run_loop(
         # The noise beside all candidates changes with a moment that is new among them, and hardly with anything else.
         reach = Reach.LOOK if moments or count == 0 else None
         loop.saturated = saturate(loop.model, competing, _prices(competing), reach, _noises(loop.saturated))
-    kept = _chosen(loop, competing)
-    loop.model = _refitted(loop, kept, Reach.LOOK)
+    else:
+        tried.append((_refitted(loop, _chosen(loop, competing)), loop.saturated))
+    # Where it comes to no rest, what was likeliest on the way.
+    counted = 1.0 / saturated.model.fit.dispersion
+    loop.model, loop.saturated = max(tried, key=lambda one: _score(one[0], counted))
     _take_back(loop)
     return loop
+
+
+def _score(model: Model, counted: float) -> float:
+    """Logarithm of a model's evidence, its nats counting by so much, and its prices paid."""
+    return -counted * model.nll - sum(_prices(model.accepted).values())
 
 
 def _of_vehicle(free: Free) -> bool:
@@ -161,10 +171,10 @@ def _in_order(posterior: Posterior, kept: Sequence[str]) -> list[str]:
     return ordered
 
 
-def _refitted(loop: Loop, kept: Sequence[Accepted], reach: Reach = Reach.NEAR) -> Model:
-    """The chosen effects with their own noise, starting from where the saturated fit has them."""
+def _refitted(loop: Loop, kept: Sequence[Accepted]) -> Model:
+    """The chosen effects with a noise that was looked at quickly, from where the saturated fit has them."""
     starts = loop.saturated.given([one.key for one in kept])
-    return refitted(loop.saturated.model, kept, starts, reach, _noises(loop.saturated))
+    return refitted(loop.saturated.model, kept, starts, Reach.LOOK, _noises(loop.saturated))
 
 
 def _with_shapes(loop: Loop, kept: list[Accepted]) -> list[Accepted]:
@@ -208,7 +218,8 @@ def _take_back(loop: Loop) -> None:
             return
         gone = {one.accepted.key for one in weak}
         reach = Reach.LOOK if weak else Reach.NEAR
-        loop.model = _refitted(loop, [one for one in loop.model.accepted if one.key not in gone], reach)
+        rest = [one for one in loop.model.accepted if one.key not in gone]
+        loop.model = refitted(loop.model, rest, reach=reach)
 
 
 def need_more(loop: Loop, needed_nats: float) -> None:

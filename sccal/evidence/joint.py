@@ -227,6 +227,11 @@ class JointFit:
         return chi2 / max(directions, 1)
 
     @property
+    def dispersion(self) -> float:
+        """How many times the stretches' χ² is what it ought to be, at least 1: so much less the nats of a log mean."""
+        return max(self.misfit, 1.0)
+
+    @property
     def nll(self) -> float:
         """Negative log-likelihood of all runs."""
         return sum(one.nll for one in self.runs)

@@ -15,7 +15,7 @@ from sccal.evidence.extension import Free, FreeEffects, name_in, view_run
 from sccal.evidence.joint import JointFit, fit_jointly, names_of
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass
-from sccal.filter.iterate import At, RunProblem, iterate
+from sccal.filter.iterate import At, RunProblem, iterate, prior_shift_nats
 from sccal.filter.levels import Noise
 from sccal.filter.noise import (
     COARSE_HZ,
@@ -201,7 +201,7 @@ def refitted(
     accepted
         The effects to be in the model.
     starts
-        Per run, where its fit starts; without them where ``model`` stands, what is not in it yet at zero.
+        Per run, where its fit may start too; otherwise where ``model`` stands, what is not in it yet at zero.
     reach
         How widely the noise is searched for; None keeps the noise.
     noises
@@ -213,8 +213,8 @@ def refitted(
     def prepared(k: int) -> tuple[RunProblem, At]:
         before = model.problems[k]
         extension = extension_of(accepted, k)
-        first = starts[k] if starts else _carried(model, k, extension)
         problem = replace(before, extension=extension, noise=noises[k] if noises else before.noise)
+        first = _likelier(problem, [_carried(model, k, extension), *starts[k : k + 1]])
         if reach is not None:
             # Under the noise of a model that lacks the effects they come near, so that the search starts from there.
             values, found = iterate(problem, first, ROUNDS_BEFORE, with_sigmas=False)
@@ -245,6 +245,17 @@ def _noise(
     return estimate_noise(
         problem.aligned, problem.start, problem.options, model.heading_rate_hz, extension, first, near, reach
     )
+
+
+def _likelier(problem: RunProblem, some: Sequence[At]) -> At:
+    """Where the data are likeliest."""
+    if len(some) == 1:
+        return some[0]
+    costs = []
+    for at in some:
+        found = problem.passed(at, with_sigmas=False)
+        costs.append(found.nll + prior_shift_nats(problem, at, found))
+    return some[int(np.argmin(costs))]
 
 
 def _carried(model: Model, run: int, extension: FreeEffects | None) -> At:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sccal.arrays import Ints
+from sccal.arrays import Floats, Ints
 from sccal.effects.effect import Parameter
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model, refitted
@@ -68,7 +68,12 @@ def saturate(
 
 
 def posterior_of(model: Model, price_nats: Mapping[str, float]) -> Posterior:
-    """What a fit says of the effects in it, with sigmas that own up to the disagreement of stretches and runs."""
+    """What a fit says of the effects in it, its data counted by how far they agree with their noise.
+
+    Where stretches disagree by more than their noise, κ times in χ² per degree of freedom, what the data say is worth
+    1/κ of its nats (the dispersion of a quasi-likelihood; Wedderburn 1974): values given that others are zero
+    stay what they are, and every sigma is √κ times as large.
+    """
     fit = model.fit
     sigma = 1.0 / np.sqrt(np.diag(fit.prior))
     sigma[:3] = fit.values[:3]
@@ -77,9 +82,15 @@ def posterior_of(model: Model, price_nats: Mapping[str, float]) -> Posterior:
         if effect:
             rows.setdefault(effect, []).append(place)
     places: dict[str, Ints] = {key: np.array(some, dtype=np.int64) for key, some in rows.items()}
-    covariance = fit.all_robust / np.outer(sigma, sigma)
+    prior = fit.prior * np.outer(sigma, sigma)
+    whole = np.linalg.inv(fit.covariance / np.outer(sigma, sigma))
+    centre = prior @ (fit.centre / sigma)
+    counted = 1.0 / fit.dispersion
+    precision = prior + counted * (whole - prior)
+    covariance: Floats = np.asarray(np.linalg.inv(0.5 * (precision + precision.T)), dtype=np.float64)
+    mean = covariance @ (centre + counted * (whole @ (fit.values / sigma) - centre))
     widths = {one.key: _widths(one.free) for one in model.accepted}
-    return Posterior(places, fit.values / sigma, covariance, sigma, price_nats, widths)
+    return Posterior(places, mean, covariance, sigma, price_nats, widths)
 
 
 def _widths(free: Free) -> tuple[float, float]:
