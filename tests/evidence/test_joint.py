@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sccal.evidence.extension import Free
 from sccal.evidence.held_out_gain import held_out_gain
 from sccal.evidence.joint import RunLikelihood, _learnt, _stretch_ends, at_least, disagreement
+from sccal.evidence.model import Accepted, Model
+from sccal.evidence.saturated import posterior_of
 from tests.evidence.linear import CENTRE, CORE_SIGMA, LinearRun, Made, fitted, true_values
 from tests.evidence.logs import bare
 
@@ -173,3 +176,26 @@ def test_what_one_run_alone_has_does_not_pass_for_the_vehicles(monkeypatch):
 def test_what_differs_between_runs_is_judged_within_each(monkeypatch):
     fit = fitted(runs_with([{"own": (0.3,)}, {"own": (-0.3,)}, {"own": (0.3,)}]), monkeypatch)
     assert gain_of(fit, "own") > 0.5 * 3 * 12 * 40 * 0.5 * 0.3**2
+
+
+def test_the_evidence_counts_so_much_less_as_the_stretches_disagree(monkeypatch):
+    """A log in which everything differs from stretch to stretch keeps its values, and most of its nats mean nothing."""
+    truth = true_values(EFFECTS, {"common": (0.2, -0.1)})
+    steady = fitted([LinearRun(EFFECTS, truth, 24, 3)], monkeypatch)
+    rng = np.random.default_rng(8)
+    differs = truth + np.array([0.0] * 3 + [0.3] * (truth.size - 3)) * rng.normal(size=(24, truth.size))
+    wild = fitted([LinearRun(EFFECTS, differs, 24, 3)], monkeypatch)
+    assert steady.dispersion == pytest.approx(1.0, abs=0.3)
+    assert wild.dispersion > 3.0
+    accepted = tuple(Accepted(Free(one)) for one in EFFECTS)
+    price = dict.fromkeys([one.key for one in accepted], 3.0)
+    told = {}
+    for name, fit in (("steady", steady), ("wild", wild)):
+        posterior = posterior_of(Model(accepted, (), fit, 10.0), price)
+        mean, _ = posterior.of("common", ["common", "other"])
+        told[name] = posterior.worth("common", ["common", "other"])
+        of_model = fit.covariance[np.ix_(rows := posterior.rows["common"], rows)] / 0.4**2
+        everything = posterior.of("common", list(posterior.rows))[1]
+        np.testing.assert_allclose(np.diag(everything) / np.diag(of_model), fit.dispersion, rtol=0.1)
+        assert mean * 0.4 == pytest.approx([0.2, -0.1], abs=0.15)
+    assert told["wild"] < 0.5 * told["steady"]

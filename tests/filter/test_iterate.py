@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.filter.iterate import At, prior_shift_nats
+from sccal.filter.forward import ForwardPass
+from sccal.filter.iterate import At, RunProblem, prior_shift_nats
 from sccal.filter.layout import BASE_STATES
 from sccal.filter.start import Constants
 
@@ -78,3 +81,32 @@ def test_a_pass_that_starts_at_the_priors_mean_needs_no_shift():
     theta = run.mean[run.learnt]
     at = At(Constants.of(theta), theta[3:])
     assert prior_shift_nats(run.problem(), at, run.passed(run.mean)) == pytest.approx(0.0, abs=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 6), st.integers(0, 10_000), st.sampled_from([0.1, 0.5]))
+def test_a_pass_with_narrower_priors_is_made_whole_again(effects, seed, scale):
+    """Mean, covariance and likelihood of the linear problem under its own prior, from those under a narrower one."""
+    run = Linear(effects, seed)
+    own = slice(4, 4 + effects)
+    run.P0[own, :] = run.P0[:, own] = 0.0
+    run.P0[own, own] = np.diag(np.random.default_rng(seed).uniform(0.2, 3.0, effects))
+    narrow = copy.copy(run)
+    narrow.P0 = run.P0.copy()
+    narrow.P0[own, own] *= scale**2
+    theta = run.mean[run.learnt]
+    problem = replace(RunProblem(None, None, None, None, None))
+    for name, value in {"prior": run.problem().prior, "prior_mean": theta}.items():
+        problem.__dict__[name] = value
+    problem.__dict__["extension"] = SimpleNamespace(prior_sigmas=np.ones(effects))
+    left = narrow.passed(run.mean)
+    empty = np.zeros(0)
+    found = ForwardPass(None, empty, empty, left.final_state, left.final_covariance, *([empty] * 6), 0, 0.0, 0.0)
+    whole = problem.with_whole_prior(At(Constants.of(theta), theta[3:]), found, scale)
+    expected = run.passed(run.mean)
+    rows = np.r_[3:7, BASE_STATES : expected.final_state.size]
+    np.testing.assert_allclose(whole.final_state[rows], expected.final_state[rows], rtol=1e-6, atol=1e-8)
+    wanted = expected.final_covariance[np.ix_(rows, rows)]
+    np.testing.assert_allclose(whole.final_covariance[np.ix_(rows, rows)], wanted, rtol=1e-6, atol=1e-8)
+    assert narrow.nll(run.mean) + whole.nll_prior == pytest.approx(run.nll(run.mean), abs=1e-6)
+    assert whole.prior_scale == scale
