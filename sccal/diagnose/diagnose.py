@@ -51,6 +51,8 @@ from sccal.filter.noise import Reach
 
 BOOTSTRAP = 400
 RANKED = 8
+MOST_ALIASES = 6
+"""Of what would explain the same, the likeliest: beyond, the drive tells hardly anything apart."""
 TRUST = {
     Trust.DETAIL: (
         "noise, constants and effects estimated together from every run's innovations; measurements count by their "
@@ -175,14 +177,11 @@ def _aliases(loop: Loop, one: Sized) -> tuple[str, ...]:
     posterior, kept, key = loop.posterior, loop.kept, one.accepted.key
     rest = [name for name in kept if name != key]
     whole, allowed = posterior.evidence(kept), max(ALIKE_NATS, ALIKE_SHARE * one.worth_nats)
-    found = [
-        name_in(name)
-        for name in posterior.rows
-        if name not in kept and whole - posterior.evidence([*rest, name]) < allowed
-    ]
+    losses = {name: whole - posterior.evidence([*rest, name]) for name in posterior.rows if name not in kept}
+    found = [name_in(name) for name in sorted(losses, key=lambda name: losses[name]) if losses[name] < allowed]
     name = one.accepted.free.effect.name
     found += [column for column, follows in loop.candidates.shadows.items() if name in follows]
-    return tuple(other for other in dict.fromkeys(found) if other != name)
+    return tuple(other for other in dict.fromkeys(found) if other != name)[:MOST_ALIASES]
 
 
 def _finding(loop: Loop, told: _Told, sigmas: dict[Key, float]) -> Finding:

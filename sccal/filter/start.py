@@ -33,6 +33,12 @@ HUBER = 1.5
 PHASE_CENTRE_M = 0.01
 ODD_SCALE = 0.15
 """Beyond this the wheels' declared scale, not their wear, is wrong."""
+CHORD_S = 2.0
+STRAIGHT_RAD = 0.2
+"""Of turning within a chord, which is then shorter than its arc by less than a per cent."""
+CLEAR_CHORD = 10.0
+"""In sigmas of a fix."""
+FEWEST_CHORDS = 12
 
 
 @dataclass(frozen=True)
@@ -87,12 +93,15 @@ def find_start(aligned: Aligned) -> Start:
     moving_from = float(aligned.wheel_t_s[begins[0]]) if begins.size else aligned.span_s[1]
     first, last = aligned.span_s
     length = FIRST_WINDOW_S
-    fit = None
+    fit, used = None, (moving_from, aligned.fix_t_s[0])
     while True:
         until = moving_from + length
         rows = np.flatnonzero((aligned.fix_t_s <= until) & (aligned.fix_t_s >= moving_from - FIRST_WINDOW_S))
         if rows.size >= 5:
-            fit = _similarity(path_at_fixes[rows], fixes[rows], sigma[rows], aligned.fix_t_s[rows])
+            wider = _similarity(path_at_fixes[rows], fixes[rows], sigma[rows], aligned.fix_t_s[rows])
+            # A heading that iron bends fits worse the more of the drive is looked at.
+            if fit is None or fit.spread_m <= MIN_SPREAD_M or wider.sigma_angle < fit.sigma_angle:
+                fit, used = wider, (until, aligned.fix_t_s[rows[0]])
             if fit.sigma_angle < ENOUGH_RAD * max(1.0, length / PATIENCE_S) and fit.spread_m > MIN_SPREAD_M:
                 break
         if until >= last:
@@ -107,7 +116,7 @@ def find_start(aligned: Aligned) -> Start:
         )
     offset = -float(np.angle(fit.alpha))
     yaw_first = float(np.interp(first, aligned.heading_t_s, aligned.yaw_rad))
-    used_from = aligned.fix_t_s[rows[0]]
+    until, used_from = used
     driven_before = float(np.abs(np.diff(travel[aligned.wheel_t_s <= used_from])).sum())
     position = fit.alpha * (path[0] - fit.path_mean) + fit.fix_mean
     return Start(
@@ -119,10 +128,32 @@ def find_start(aligned: Aligned) -> Start:
         sigma_yaw_rad=float(
             np.sqrt(HEADING_FLOOR_RAD**2 + (2 * fit.sigma_angle) ** 2 + min(fit.rms_m / fit.spread_m, 1.0) ** 2)
         ),
-        wheel_scale=float(np.abs(fit.alpha)),
+        wheel_scale=_scale_of_chords(aligned) or float(np.abs(fit.alpha)),
         moving_from_s=moving_from,
         until_s=min(until, last),
     )
+
+
+def _scale_of_chords(aligned: Aligned) -> float | None:
+    """Metres by the fixes per metre by the wheels over stretches that the wheels drive straight, whatever the heading.
+
+    The median, None where there are few.
+    """
+    first, last = max(aligned.span_s[0], aligned.fix_t_s[0]), min(aligned.span_s[1], aligned.fix_t_s[-1])
+    t_s = np.arange(first, last, CHORD_S)
+    if t_s.size <= FEWEST_CHORDS:
+        return None
+    vehicle = aligned.vehicle
+    travel = np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.travel_m)))
+    turn = np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.right_rad - aligned.left_rad))
+    turn *= vehicle.wheel_radius_m / vehicle.track_m
+    place = np.interp(t_s, aligned.fix_t_s, aligned.fix_east_m + 1j * aligned.fix_north_m)
+    sigma_m = float(np.median(np.sqrt(aligned.fix_var_east_m2 + aligned.fix_var_north_m2)))
+    chord = np.abs(np.diff(place))
+    clear = (np.abs(turn) < STRAIGHT_RAD) & (chord > CLEAR_CHORD * sigma_m) & (travel > 0.0)
+    if clear.sum() < FEWEST_CHORDS:
+        return None
+    return float(np.median(chord[clear] / travel[clear]))
 
 
 def first_constants(aligned: Aligned, start: Start) -> Constants:
