@@ -33,17 +33,17 @@ MOST_SECONDS = 1200.0
 """A longer run is looked at in proportion more coarsely: a jump that matters there is one of minutes."""
 WINDOW_S = 4.0
 SUSPECTS = 6
-GRID = 14
+GRID = 24
 BESIDE_S = (0.0, 0.7, 1.5)
 """A jump begins within a second or so of where its window does."""
+BEFORE_S = (0.0, -3.0, -6.0, -10.0)
+"""What changes in the motion shows in the fixes some metres later."""
 APART_S = 12.0
 EDGE_S = 20.0
 """Nothing is looked for so near to the ends: a step there is a start."""
 ZOOMS, POINTS = 3, 7
 RADII_M = (1.5, 3.0, 6.0)
 PLACE_RADII = 1.0
-ORDINARY = 3.0
-"""A find must stand out so many times above what any other moment of the run gains."""
 AROUND = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)
 LEAST_TAU_SHARE = 0.02
 
@@ -115,7 +115,7 @@ class Scan:
         return {
             "headings": (aligned.heading_t_s[timeline.heading_index], heading),
             "fixes": (aligned.fix_t_s[timeline.fix_index], fix),
-            "motion": (np.zeros(0), np.zeros(0)),
+            "motion": (aligned.fix_t_s[timeline.fix_index], fix),
         }
 
     def trial(
@@ -250,7 +250,8 @@ def _without(model: Model, run: int, accepted: Accepted) -> Scan:
 def _search_time(
     scan: Scan, whole: RunProblem, run: int, effect: Effect, suspects: Floats, grid: Floats
 ) -> list[Found]:
-    around = (suspects[:, None] + np.array(BESIDE_S)).ravel()
+    beside = BEFORE_S if effect.suspect_stream == "motion" else BESIDE_S
+    around = np.clip((suspects[:, None] + np.array(beside)).ravel(), grid[0], grid[-1])
     tries = np.concatenate((around, grid))
     best, gains = scan.best(effect, [{"at_s": float(s)} for s in tries])
     ordinary = _ordinary(gains[around.size :])
@@ -344,7 +345,7 @@ def _with_place_errors(scan: Scan, found: Found) -> Found:
 
 def _found(scan: Scan, run: int, effect: Effect, shapes: Mapping[str, float], ordinary: float) -> list[Found]:
     gain, values, sigmas = scan.trial(effect, shapes)
-    gain -= SEARCH_NATS + ORDINARY * ordinary
+    gain -= SEARCH_NATS + ordinary
     return [Found(run, Free(effect, dict(shapes), WIDEST), values, sigmas, gain)] if gain > 0.0 else []
 
 
