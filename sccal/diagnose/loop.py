@@ -128,7 +128,7 @@ def run_loop(
     else:
         tried.append((_refitted(loop, _chosen(loop, competing)), loop.saturated))
     # Where it comes to no rest, what was likeliest on the way.
-    counted = 1.0 / saturated.model.fit.dispersion
+    counted = 1.0 / min((model for model, _ in tried), key=lambda model: model.nll).fit.dispersion
     loop.model, loop.saturated = max(tried, key=lambda one: _score(one[0], counted))
     _take_back(loop)
     return loop

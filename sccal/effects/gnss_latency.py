@@ -48,7 +48,7 @@ def late_fix(drive: DriveView, delay_s: Floats | float) -> tuple[Floats, Floats]
     return -chord * np.cos(half_turn), chord * np.sin(half_turn)
 
 
-TRANSPORT_S = 0.02
+TRANSPORT_S = 0.015
 """What lines take to arrive, and how well a receiver's time and the computer's agree: no log shows it."""
 
 
