@@ -21,10 +21,11 @@ HEADING_RATE_HZ, WINDOW_S = 10.0, 30.0
 """The defaults of `sccal diagnose`."""
 GOOD_VERDICT = "good"
 CAUSE_WORDS = (
-    r"iron|slip|lever|antenna|latency|skew|drift|field|scrub|slope|eccentric|counts|offset of|base|would name|wander"
+    r"iron|slip|lever|antenna|latency|skew|drift|field|scrub|slope|eccentric|counts|offset of|base|would name"
     r"|latenc|magnet|step"
 )
-"""A verdict that holds one of these tells of a cause; on a log without effects that is one too many."""
+"""A verdict that holds one of these tells of a cause; on a log without effects that is one too many. That a heading or
+fixes wander is no cause, and true of some of these logs."""
 
 
 @dataclass(frozen=True)

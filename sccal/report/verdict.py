@@ -132,7 +132,5 @@ def _noise_doubts(noise: Noise) -> list[str]:
         )
     if heading_wanders(noise):
         wander_deg = math.degrees(noise.heading_coloured_rad)
-        doubts.append(
-            f"heading wanders by {short(wander_deg, 2)} deg about the model: iron near the compass, or a clock"
-        )
+        doubts.append(f"heading wanders by {short(wander_deg, 2)} deg about the model, more than an AHRS does")
     return doubts

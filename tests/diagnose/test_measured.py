@@ -36,7 +36,7 @@ def test_the_van_lacks_its_antenna_beside_the_middle():
     assert arm.name == "lever_arm"
     assert arm.parameters["left_m"].value == pytest.approx(-0.7375, abs=0.02)
     assert 1.5 < found.parameters_after.track_m.value < 1.7
-    assert found.after.outage_end_rms_m <= 0.8 * found.before.outage_end_rms_m
+    assert found.after.outage_end_rms_m <= 0.7 * found.before.outage_end_rms_m
     assert found.placebo.passed <= 1
     the_readme_shows(diagnosis_text(found, 100))
 
@@ -56,8 +56,8 @@ def test_the_husky_lacks_the_iron_at_its_compass():
     found = diagnosed("husky")
     iron = found.findings[0]
     assert iron.name == "hard_iron"
-    assert 15.0 < np.hypot(iron.parameters["cos_deg"].value, iron.parameters["sin_deg"].value) < 30.0
-    assert found.after.gnss_innovation_rms_m <= found.before.gnss_innovation_rms_m / 3.0
+    assert 15.0 < np.hypot(iron.parameters["cos_deg"].value, iron.parameters["sin_deg"].value) < 45.0
+    assert found.after.gnss_innovation_rms_m <= found.before.gnss_innovation_rms_m / 4.0
 
 
 def test_each_run_of_the_van_covers_what_all_say_together(tmp_path):
