@@ -21,9 +21,9 @@ def test_fixes_moved_to_a_later_time_were_ahead_of_their_stamp():
     (found,) = with_moved([], [run(fixes=Moved(0.38, 0.001))])
     assert found.name == "gnss_latency"
     assert found.parameters["s"].value == pytest.approx(-0.38)
-    assert found.parameters["s"].sigma == pytest.approx(0.02, rel=0.01)
+    assert found.parameters["s"].sigma == pytest.approx(0.015, rel=0.01)
     assert found.aligned
-    assert found.t == pytest.approx(19.0, rel=0.01)
+    assert found.t == pytest.approx(0.38 / 0.015, rel=0.01)
 
 
 def test_headings_moved_to_an_earlier_time_were_old():
