@@ -20,13 +20,13 @@ Effects = Mapping[str, Mapping[str, Estimate]]
 
 def model_of_run(calibration: Calibration, problem: RunProblem, heading_rate_hz: float) -> Model:
     """The model that one run was calibrated with."""
-    return model_of([problem], [_at(problem, calibration.parameters, calibration.effects)], heading_rate_hz)
+    return model_of([problem], [at_estimates(problem, calibration.parameters, calibration.effects)], heading_rate_hz)
 
 
 def model_of_vehicle(vehicle: VehicleCalibration, problems: Sequence[RunProblem], heading_rate_hz: float) -> Model:
     """The model of all runs of a vehicle."""
     starts = [
-        _at(problem, vehicle.parameters, {**run.effects, **vehicle.effects})
+        at_estimates(problem, vehicle.parameters, {**run.effects, **vehicle.effects})
         for problem, run in zip(problems, vehicle.runs, strict=True)
     ]
     return model_of(problems, starts, heading_rate_hz)
@@ -88,9 +88,11 @@ def _along_the_path(model: Model) -> dict[tuple[str, str], tuple[float, float]]:
     return {key: (float(np.mean([v for v, _ in some])), max(s for _, s in some)) for key, some in found.items()}
 
 
-def _at(problem: RunProblem, parameters: Parameters, effects: Effects) -> At:
+def at_estimates(problem: RunProblem, parameters: Parameters, effects: Effects) -> At:
+    """Where a run's passes start from some estimates; effects that these do not hold at zero."""
     constants = Constants(parameters.radius_right_m.value, parameters.radius_left_m.value, parameters.track_m.value)
     extension = problem.extension
     free = extension.parameters if isinstance(extension, FreeEffects) else ()
-    values = np.array([effects[effect.name][one.name].value for effect, one in free], dtype=np.float64)
+    known = [effects.get(effect.name, {}).get(one.name) for effect, one in free]
+    values = np.array([0.0 if one is None else one.value for one in known], dtype=np.float64)
     return At(constants, values)

@@ -14,6 +14,7 @@ import numpy as np
 from sccal.align import Aligned, align, build_timeline
 from sccal.align.clocks import DAY_S, ERA_S
 from sccal.arrays import Floats
+from sccal.calibration.beside_small import at_estimates
 from sccal.calibration.causes import find_causes
 from sccal.calibration.consistency import consistency_over_time
 from sccal.calibration.manoeuvres import describe_manoeuvres
@@ -34,10 +35,10 @@ from sccal.calibration.result import (
 from sccal.calibration.status import effect_estimates, judge
 from sccal.calibration.unseen import unseen_parameters
 from sccal.evidence.extension import FreeEffects
-from sccal.evidence.model import Accepted, bare_model, refitted
+from sccal.evidence.model import Accepted, Trust, bare_model, refitted, trust_in
 from sccal.filter.forward import ForwardPass, fix_nis
-from sccal.filter.iterate import At, RunProblem, iterate, reported_covariance, reported_values
-from sccal.filter.noise import Reach, estimate_noise
+from sccal.filter.iterate import At, RunProblem, iterate, likeliest, reported_covariance, reported_values
+from sccal.filter.noise import MISFIT_HZ, Reach, estimate_noise
 from sccal.filter.start import ODD_SCALE, Constants, find_start
 from sccal.logs.streams import Notice, Run
 
@@ -61,7 +62,12 @@ def prepare(aligned: Aligned, options: CalibrationOptions) -> RunProblem:
         bare = bare_model([aligned], options.filter, options.heading_rate_hz)
         accepted = [Accepted(free) for free in extension.effects]
         noise = refitted(bare, accepted, reach=Reach.FEW).problems[0].noise
-    timeline = build_timeline(aligned, options.output_rate_hz, options.heading_rate_hz)
+    if trust_in(noise) is Trust.PATH:
+        # All misfit is white in it, at the rates at which it was found.
+        heading_hz, fix_hz, _ = MISFIT_HZ
+        timeline = build_timeline(aligned, options.output_rate_hz, heading_hz, fix_hz)
+    else:
+        timeline = build_timeline(aligned, options.output_rate_hz, options.heading_rate_hz)
     return RunProblem(aligned, timeline, start, noise, options.filter, extension)
 
 
@@ -85,7 +91,11 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
 
     problem = replace(problem, options=replace(options.filter, soft_gate=True))
     learnt = reported_values(honest)
-    values, final = iterate(problem, At(Constants.of(learnt), learnt[4:], honest))
+    first = [At(Constants.of(learnt), learnt[4:], honest)]
+    if (model := options.model) is not None:
+        judged_at = at_estimates(problem, model.parameters, {one.name: one.parameters for one in model.effects})
+        first.append(replace(judged_at, path=honest))
+    values, final = iterate(problem, likeliest(problem, first))
     covariance = reported_covariance(final)
     if options.filter.with_offset:
         covariance[3, 3] += _variance_of_the_level(problem)

@@ -15,7 +15,7 @@ from sccal.evidence.extension import Free, FreeEffects, name_in, view_run
 from sccal.evidence.joint import JointFit, fit_jointly, names_of
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass
-from sccal.filter.iterate import At, RunProblem, iterate, prior_shift_nats
+from sccal.filter.iterate import At, RunProblem, iterate, likeliest
 from sccal.filter.levels import Noise
 from sccal.filter.noise import (
     COARSE_HZ,
@@ -214,7 +214,7 @@ def refitted(
         before = model.problems[k]
         extension = extension_of(accepted, k)
         problem = replace(before, extension=extension, noise=noises[k] if noises else before.noise)
-        first = _likelier(problem, [_carried(model, k, extension), *starts[k : k + 1]])
+        first = likeliest(problem, [_carried(model, k, extension), *starts[k : k + 1]])
         if reach is not None:
             # Under the noise of a model that lacks the effects they come near, so that the search starts from there.
             values, found = iterate(problem, first, ROUNDS_BEFORE, with_sigmas=False)
@@ -245,17 +245,6 @@ def _noise(
     return estimate_noise(
         problem.aligned, problem.start, problem.options, model.heading_rate_hz, extension, first, near, reach
     )
-
-
-def _likelier(problem: RunProblem, some: Sequence[At]) -> At:
-    """Where the data are likeliest."""
-    if len(some) == 1:
-        return some[0]
-    costs = []
-    for at in some:
-        found = problem.passed(at, with_sigmas=False)
-        costs.append(found.nll + prior_shift_nats(problem, at, found))
-    return some[int(np.argmin(costs))]
 
 
 def _carried(model: Model, run: int, extension: FreeEffects | None) -> At:

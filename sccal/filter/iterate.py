@@ -7,6 +7,7 @@ posterior mode (as in the iterated Kalman filter, Bell and Cathey 1993).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -254,6 +255,17 @@ def iterate(
         at = At(Constants.of(mode[learnt]), mode[learnt][3:], found if problem.extra else None)
     assert best is not None
     return best[3], best[2]
+
+
+def likeliest(problem: RunProblem, some: Sequence[At]) -> At:
+    """Of some places to start from, that at which the data are likeliest."""
+    if len(some) == 1:
+        return some[0]
+    costs = []
+    for at in some:
+        found = problem.passed(at, with_sigmas=False)
+        costs.append(found.nll + prior_shift_nats(problem, at, found))
+    return some[int(np.argmin(costs))]
 
 
 def prior_shift_nats(problem: RunProblem, at: At, found: ForwardPass) -> float:

@@ -33,6 +33,7 @@ HUBER = 1.5
 PHASE_CENTRE_M = 0.01
 ODD_SCALE = 0.15
 """Beyond this the wheels' declared scale, not their wear, is wrong."""
+MUCH_UNSURER = 2.0
 CHORD_S = 2.0
 STRAIGHT_RAD = 0.2
 """Of turning within a chord, which is then shorter than its arc by less than a per cent."""
@@ -100,7 +101,7 @@ def find_start(aligned: Aligned) -> Start:
         if rows.size >= 5:
             wider = _similarity(path_at_fixes[rows], fixes[rows], sigma[rows], aligned.fix_t_s[rows])
             # A heading that iron bends fits worse the more of the drive is looked at.
-            if fit is None or fit.spread_m <= MIN_SPREAD_M or wider.sigma_angle < fit.sigma_angle:
+            if fit is None or fit.spread_m <= MIN_SPREAD_M or wider.sigma_angle < MUCH_UNSURER * fit.sigma_angle:
                 fit, used = wider, (until, aligned.fix_t_s[rows[0]])
             if fit.sigma_angle < ENOUGH_RAD * max(1.0, length / PATIENCE_S) and fit.spread_m > MIN_SPREAD_M:
                 break
