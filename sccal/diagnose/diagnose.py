@@ -19,12 +19,7 @@ from sccal.calibration.result import Estimate, OutageWindow, Parameters
 from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.calibration.single import describe_drive
 from sccal.calibration.status import judge as judge_parameters
-from sccal.diagnose.criteria import (
-    ALIKE_NATS,
-    ALIKE_SHARE,
-    CLEARLY_LESS,
-    LEAST_NATS,
-)
+from sccal.diagnose.criteria import ALIKE_NATS, ALIKE_SHARE, CLEARLY_LESS, LEAST_NATS
 from sccal.diagnose.excitation import excitation
 from sccal.diagnose.loop import Loop, Sized, need_more, run_loop, values_in
 from sccal.diagnose.moved import with_moved

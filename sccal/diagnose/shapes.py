@@ -24,7 +24,7 @@ from sccal.evidence.model import Accepted, Model
 from sccal.evidence.parallel import each
 from sccal.evidence.posterior import WIDEST
 from sccal.filter.forward import ForwardPass
-from sccal.filter.iterate import At, RunProblem, prior_shift_nats
+from sccal.filter.iterate import At, RunProblem, whole_nll
 from sccal.filter.layout import BASE_STATES
 from sccal.filter.noise import at_once
 
@@ -104,7 +104,7 @@ class Scan:
         if isinstance(extension, FreeEffects):
             columns = extension.columns_in(self.view, at.values, problem.timeline, self.laid)
         found = problem.passed(at, self.clear, columns, with_sigmas=False)
-        return found.nll + prior_shift_nats(problem, at, found), found
+        return whole_nll(problem, at, found), found
 
     @property
     def suspicious(self) -> dict[str, tuple[Floats, Floats]]:

@@ -24,7 +24,7 @@ from sccal.arrays import Floats, Ints
 from sccal.evidence.extension import FreeEffects
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass, numeric_limits
-from sccal.filter.iterate import MOST_HALVINGS, WORSE_NATS, At, RunProblem, prior_shift_nats
+from sccal.filter.iterate import MOST_HALVINGS, WORSE_NATS, At, RunProblem, whole_nll
 from sccal.filter.start import Constants
 
 MAX_ROUNDS = 4
@@ -90,7 +90,7 @@ class RunLikelihood:
             stretches.append(Stretch(after[0] - before[0], after[1] - before[1]))
         found = problem.with_whole_prior(at, run.finish(), at.prior_scale)
         precision, vector = _learnt(found.final_covariance, found.final_state)
-        nll = found.nll + prior_shift_nats(problem, at, found)
+        nll = whole_nll(problem, at, found)
         return cls(precision - prior, vector - prior @ theta, found, nll, tuple(stretches))
 
 

@@ -230,10 +230,10 @@ def iterate(
     for _ in range(max_rounds + MOST_HALVINGS):
         theta = np.concatenate((at.constants.as_array(), at.values))
         found = problem.passed(at, with_sigmas=with_sigmas, prior_scale=scale)
-        cost = found.nll + prior_shift_nats(problem, at, found)
+        cost = whole_nll(problem, at, found)
         if best is None and problem.extra:
             narrow = problem.passed(at, with_sigmas=with_sigmas, prior_scale=NARROW)
-            if (other := narrow.nll + prior_shift_nats(problem, at, narrow)) < cost - WORSE_NATS:
+            if (other := whole_nll(problem, at, narrow)) < cost - WORSE_NATS:
                 found, cost, scale = narrow, other, NARROW
         if best is not None and not cost < best[0] + WORSE_NATS:
             # The step went too far: half of it, from where the data were likeliest.
@@ -261,11 +261,15 @@ def likeliest(problem: RunProblem, some: Sequence[At]) -> At:
     """Of some places to start from, that at which the data are likeliest."""
     if len(some) == 1:
         return some[0]
-    costs = []
-    for at in some:
-        found = problem.passed(at, with_sigmas=False)
-        costs.append(found.nll + prior_shift_nats(problem, at, found))
-    return some[int(np.argmin(costs))]
+    return min(some, key=lambda at: whole_nll(problem, at, problem.passed(at, with_sigmas=False)))
+
+
+def whole_nll(problem: RunProblem, at: At, found: ForwardPass) -> float:
+    """Negative log-likelihood of a run's measurements, constants and effects marginalised under their own priors.
+
+    ``found`` is a pass that started and linearised at ``at``.
+    """
+    return found.nll + prior_shift_nats(problem, at, found)
 
 
 def prior_shift_nats(problem: RunProblem, at: At, found: ForwardPass) -> float:

@@ -27,7 +27,7 @@ from scipy.special import ndtri
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
 from sccal.arrays import Bools, Floats
-from sccal.filter.iterate import At, Extension, RunProblem, iterate, prior_shift_nats
+from sccal.filter.iterate import At, Extension, RunProblem, iterate, whole_nll
 from sccal.filter.levels import Levels, Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, coarse_constants
@@ -269,7 +269,7 @@ class Search:
         def cost(level: Floats) -> float:
             problem = self.problem(timeline, level)
             found = problem.passed(at, clear, columns, start, with_sigmas=False)
-            value = found.nll + prior_shift_nats(problem, at, found) + self.levels.price(level)
+            value = whole_nll(problem, at, found) + self.levels.price(level)
             return value if np.isfinite(value) else 1e12
 
         return cost

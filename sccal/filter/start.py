@@ -74,10 +74,10 @@ class Start:
     sigma_position_m: float
     sigma_yaw_rad: float
     wheel_scale: float
-    """Travel by the fixes over travel by the wheels with the nominal radius."""
+    """Travel by the fixes over travel by the wheels with the nominal radius, over all of the run's straights."""
     moving_from_s: float
     until_s: float
-    """End of the stretch that this rests on; nothing later was used."""
+    """End of the stretch that the pose and the offset rest on; nothing later was used for them."""
 
 
 def find_start(aligned: Aligned) -> Start:

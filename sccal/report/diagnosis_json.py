@@ -72,6 +72,7 @@ def _finding(finding: Finding) -> Json:
             "t": finding.t,
         },
         "indistinguishable_from": finding.indistinguishable_from,
+        "aligned": finding.aligned,
         "per_run": {name: [estimate_block(one) for one in each] for name, each in finding.per_run.items()},
         "advice": finding.advice,
         "drift_before_m": finding.drift_before_m,
