@@ -1,6 +1,6 @@
 """Antenna height: on a body that pitches and rolls, an antenna above the ground swings out.
 
-fix += Rot(θ) (−h sin pitch, −h sin roll)      nose up: backwards      left side up: to the right
+fix += Rot(θ) (−h sin pitch cos roll, −h sin roll)      nose up: backwards      left side up: to the right
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class AntennaHeight(Effect):
         return f"the antenna stands {where}, and swings out where the robot pitches and rolls"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
-        steps = drive.steps
-        back, right = (np.sin(drive.at_fixes(tilt)) for tilt in (steps.pitch_rad, steps.roll_rad))
+        pitch, roll = (drive.at_fixes(tilt) for tilt in (drive.steps.pitch_rad, drive.steps.roll_rad))
+        back, right = np.sin(pitch) * np.cos(roll), np.sin(roll)
         return (Column("m", "antenna_forward", -back), Column("m", "antenna_left", -right))
 
     def physics(self, values: Mapping[str, float]) -> Physics:

@@ -31,6 +31,7 @@ class ClockSkew(Effect):
     name = "clock_skew"
     title = "the fixes' clock runs faster or slower than the wheels'"
     parameters = (Parameter("ppm", "ppm", 100.0, -5000.0, 5000.0, "run", matters=30),)
+    stage = "body"
     looks_like = "fixes lag behind the path, or run ahead of it, in proportion to speed and more with every minute"
     excited_by = "drive for longer, keep moving, and stop or reverse 10 m now and then up to the end"
     reference = "Moon, Skelly and Towsley 1999, Estimation and removal of clock skew from network delay measurements"

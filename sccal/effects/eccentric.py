@@ -32,6 +32,7 @@ class EccentricLeft(Effect):
     """Uneven running of the left wheel, as a share of its radius."""
 
     name = "eccentric_left"
+    stage = "wheels"
     title = "left wheel or its encoder off the axle's middle"
     parameters = _PARAMETERS
     looks_like = "heading and path wobble once per turn of the left wheel"
@@ -53,6 +54,7 @@ class EccentricRight(Effect):
     """Uneven running of the right wheel, as a share of its radius."""
 
     name = "eccentric_right"
+    stage = "wheels"
     title = "right wheel or its encoder off the axle's middle"
     parameters = _PARAMETERS
     looks_like = "heading and path wobble once per turn of the right wheel"

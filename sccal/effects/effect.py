@@ -28,6 +28,9 @@ Cause = Literal["heading", "speed", "turn_rate", "acceleration", "time", "pitch"
 """What a residual may be drawn against."""
 Search = Literal["none", "scale", "moment", "place"]
 Stream = Literal["headings", "fixes", "motion"]
+Stage = Literal["wheels", "ground", "body"]
+"""What the counters say becomes the wheels' travel, this the body's motion, and this what late readings show."""
+STAGES: tuple[Stage, ...] = ("wheels", "ground", "body")
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ class Effect(ABC):
     reference: str
     bends_heading: bool = False
     """Whether its columns at the heading follow its own values or the robot's heading, as iron's do."""
+    stage: Stage = "ground"
+    """Where it stands between the counters and the body: what comes later is made of what the earlier leave."""
     on_every_robot: bool = False
     """Whether every robot with a receiver has some of it, so that a drive that cannot show it is worth a word."""
     shown_against: Cause = "time"

@@ -56,6 +56,7 @@ class GnssLatency(Effect):
     """Age of the fixes, s; above zero they are old."""
 
     name = "gnss_latency"
+    stage = "body"
     on_every_robot = True
     title = "fixes that show an earlier place than their stamp says"
     parameters = (Parameter("s", "s", 0.2, -2.0, 2.0, "run", matters=0.07, hidden_sigma=TRANSPORT_S),)

@@ -27,6 +27,7 @@ class HeadingLatency(Effect):
     parameters = (Parameter("s", "s", 0.2, -2.0, 2.0, "run", matters=0.03),)
     looks_like = "the heading lags in every turn, the more the faster the turn, and is right again on the straight"
     excited_by = "spin in place both ways, at two turn rates"
+    stage = "body"
     bends_heading = True
     undone_for = "headings"
     reference = "Kelly and Sukhatme 2014, A general framework for temporal calibration of multiple sensors"

@@ -43,6 +43,7 @@ class MissedLeft(Effect):
     """Share of the left wheel's counts that are lost, and the rate of the wheel above which they are."""
 
     name = "missed_left"
+    stage = "wheels"
     title = "left counter that loses counts at speed"
     parameters = _PARAMETERS
     looks_like = "the left radius seems larger on fast stretches; there the path bends to the left by the wheels alone"
@@ -69,6 +70,7 @@ class MissedRight(Effect):
     """Share of the right wheel's counts that are lost, and the rate of the wheel above which they are."""
 
     name = "missed_right"
+    stage = "wheels"
     title = "right counter that loses counts at speed"
     parameters = _PARAMETERS
     looks_like = (

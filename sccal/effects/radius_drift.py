@@ -24,6 +24,7 @@ class RadiusDrift(Effect):
     """Growth of both radii, as a share of them per hour."""
 
     name = "radius_drift"
+    stage = "wheels"
     title = "radii that grow during the run: warming tyres, soil that sticks"
     parameters = (Parameter("per_hour", "1/h", 0.05, -1.0, 1.0, scope="run", matters=0.01),)
     looks_like = "both radii estimated from the first half of the run differ from those of the second half, gradually"

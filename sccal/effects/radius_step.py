@@ -22,6 +22,7 @@ class RadiusStep(Effect):
     """Share by which both radii are larger from ``at_s`` on."""
 
     name = "radius_step"
+    stage = "wheels"
     title = "radii that change at one moment: a load, mud, a loss of pressure"
     parameters = (
         Parameter("ratio", "1", 0.02, -0.5, 0.5, scope="run", matters=0.004),

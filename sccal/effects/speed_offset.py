@@ -35,6 +35,7 @@ class SpeedOffset(Effect):
     """What the wheels' speed reads too fast, m/s, forwards and backwards alike."""
 
     name = "speed_offset"
+    stage = "wheels"
     title = "wheel speed that reads too fast by a constant"
     parameters = (Parameter("mps", "m/s", 0.05, -0.5, 0.5, matters=0.005),)
     looks_like = "both radii seem smaller on slow stretches than on fast ones, in proportion to the time they take"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class Steps:
     along_m: Floats
     turn_rad: Floats
     """By the wheels."""
+    track_m: float
     speed_mps: Floats
     turn_rate_radps: Floats
     acceleration_mps2: Floats
@@ -65,6 +66,8 @@ class DriveView:
     steps: Steps
     headings: Moments
     fixes: Moments
+    fix_delay_s: Floats | float = 0.0
+    """How old each fix is as far as known (f,): it shows the robot as it stood so long before its stamp."""
     logged: Mapping[str, Series] = field(default_factory=dict)
     """The log's further columns."""
     has_tilt: bool = False
@@ -80,8 +83,8 @@ class DriveView:
         return self._at_steps(self.headings.east_m), self._at_steps(self.headings.north_m)
 
     def at_fixes(self, of_steps: Floats) -> Floats:
-        """A quantity of the motion events (n,) at the fixes."""
-        return np.interp(self.fixes.t_s, self.steps.t_s, of_steps)
+        """A quantity of the motion events (n,) where the fixes show the robot (f,)."""
+        return np.interp(self.fixes.t_s - self.fix_delay_s, self.steps.t_s, of_steps)
 
     def _at_steps(self, of_headings: Floats) -> Floats:
         return np.interp(self.steps.t_s, self.headings.t_s, of_headings)
@@ -117,28 +120,17 @@ def view_drive(
     right_rad, left_rad = (timeline.right_rad, timeline.left_rad) if clear is None else clear
     right_m, left_m = belief.radius_right_m * right_rad, belief.radius_left_m * left_rad
     if clear is None:
-        t = aligned.wheel_t_s
         right, left = belief.radius_right_m * aligned.right_rad, belief.radius_left_m * aligned.left_rad
+        rates = _Rates(aligned.wheel_t_s, 0.5 * (right + left), (right - left) / belief.track_m)
     else:
-        t = timeline.t_s
-        right, left = np.cumsum(right_m), np.cumsum(left_m)
-    along, turn = 0.5 * (right + left), (right - left) / belief.track_m
-    half = 0.5 * SMOOTH_S
-
-    def rate(cumulative: Floats, at_s: Floats, times: Floats = t) -> Floats:
-        first, last = np.maximum(at_s - half, times[0]), np.minimum(at_s + half, times[-1])
-        change = np.interp(last, times, cumulative) - np.interp(first, times, cumulative)
-        return np.asarray(change / np.maximum(last - first, 1e-9))
-
-    def acceleration(at_s: Floats) -> Floats:
-        return (rate(along, at_s + half) - rate(along, at_s - half)) / (2.0 * half)
+        rates = _Rates.of_steps(timeline.t_s, right_m, left_m, belief.track_m)
 
     def moments(at_s: Floats) -> Moments:
         return Moments(
             t_s=at_s,
-            speed_mps=rate(along, at_s),
-            turn_rate_radps=rate(turn, at_s),
-            acceleration_mps2=acceleration(at_s),
+            speed_mps=rates.speed(at_s),
+            turn_rate_radps=rates.turn_rate(at_s),
+            acceleration_mps2=rates.acceleration(at_s),
             yaw_rad=np.interp(at_s, belief.t_s, belief.yaw_rad),
             east_m=np.interp(at_s, belief.t_s, belief.east_m),
             north_m=np.interp(at_s, belief.t_s, belief.north_m),
@@ -156,13 +148,14 @@ def view_drive(
         left_m=left_m,
         along_m=0.5 * (right_m + left_m),
         turn_rad=(right_m - left_m) / belief.track_m,
-        speed_mps=rate(along, middle),
-        turn_rate_radps=rate(turn, middle),
-        acceleration_mps2=acceleration(middle),
+        track_m=belief.track_m,
+        speed_mps=rates.speed(middle),
+        turn_rate_radps=rates.turn_rate(middle),
+        acceleration_mps2=rates.acceleration(middle),
         right_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.right_rad),
         left_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.left_rad),
-        right_rate_radps=rate(aligned.right_rad, middle, aligned.wheel_t_s),
-        left_rate_radps=rate(aligned.left_rad, middle, aligned.wheel_t_s),
+        right_rate_radps=_rate(aligned.wheel_t_s, aligned.right_rad, middle),
+        left_rate_radps=_rate(aligned.wheel_t_s, aligned.left_rad, middle),
         pitch_rad=zeros if pitch is None else np.interp(middle, aligned.heading_t_s, pitch),
         roll_rad=zeros if roll is None else np.interp(middle, aligned.heading_t_s, roll),
     )
@@ -175,3 +168,62 @@ def view_drive(
         logged=aligned.extras,
         has_tilt=pitch is not None and roll is not None,
     )
+
+
+def with_travel(drive: DriveView, right_m: Floats, left_m: Floats) -> DriveView:
+    """The same drive with other travel of the wheels in each step (n,): speeds and turn rates follow."""
+    steps = drive.steps
+    rates = _Rates.of_steps(steps.t_s, right_m, left_m, steps.track_m)
+
+    def moments(of: Moments) -> Moments:
+        return replace(
+            of,
+            speed_mps=rates.speed(of.t_s),
+            turn_rate_radps=rates.turn_rate(of.t_s),
+            acceleration_mps2=rates.acceleration(of.t_s),
+        )
+
+    middle = steps.t_s - 0.5 * steps.dt_s
+    moved = replace(
+        steps,
+        right_m=right_m,
+        left_m=left_m,
+        along_m=0.5 * (right_m + left_m),
+        turn_rad=(right_m - left_m) / steps.track_m,
+        speed_mps=rates.speed(middle),
+        turn_rate_radps=rates.turn_rate(middle),
+        acceleration_mps2=rates.acceleration(middle),
+    )
+    return replace(drive, steps=moved, headings=moments(drive.headings), fixes=moments(drive.fixes))
+
+
+@dataclass(frozen=True)
+class _Rates:
+    """Speed, turn rate and acceleration over SMOOTH_S about any time."""
+
+    t_s: Floats
+    along_m: Floats
+    """Cumulative, as the turn."""
+    turn_rad: Floats
+
+    @classmethod
+    def of_steps(cls, t_s: Floats, right_m: Floats, left_m: Floats, track_m: float) -> _Rates:
+        right, left = np.cumsum(right_m), np.cumsum(left_m)
+        return cls(t_s, 0.5 * (right + left), (right - left) / track_m)
+
+    def speed(self, at_s: Floats) -> Floats:
+        return _rate(self.t_s, self.along_m, at_s)
+
+    def turn_rate(self, at_s: Floats) -> Floats:
+        return _rate(self.t_s, self.turn_rad, at_s)
+
+    def acceleration(self, at_s: Floats) -> Floats:
+        half = 0.5 * SMOOTH_S
+        return (self.speed(at_s + half) - self.speed(at_s - half)) / (2.0 * half)
+
+
+def _rate(t_s: Floats, cumulative: Floats, at_s: Floats) -> Floats:
+    half = 0.5 * SMOOTH_S
+    first, last = np.maximum(at_s - half, t_s[0]), np.minimum(at_s + half, t_s[-1])
+    change = np.interp(last, t_s, cumulative) - np.interp(first, t_s, cumulative)
+    return np.asarray(change / np.maximum(last - first, 1e-9))

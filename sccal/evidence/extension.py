@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from sccal.align import Aligned, Timeline
 from sccal.arrays import Floats
 from sccal.effects.catalogue import CATALOGUE, effect_named
-from sccal.effects.effect import Column, Effect, Parameter
+from sccal.effects.effect import STAGES, Column, Effect, Parameter
 from sccal.effects.logged import logged_effects
-from sccal.effects.view import Belief, DriveView, view_drive
+from sccal.effects.view import Belief, DriveView, view_drive, with_travel
 from sccal.errors import DataError, UsageError
-from sccal.filter.columns import HeadingBend, Placed, kernel_columns
+from sccal.filter.columns import MOTION_PORTS, HeadingBend, Placed, kernel_columns
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import Columns
 
@@ -160,31 +161,65 @@ class FreeEffects:
 
         Columns at the heading are derivatives at the values, beside what makes the whole exact there. With D(p, ψ) what
         an effect does to the reading, and c = ∂D/∂p: D(p₀, ψ₀) − c p₀ is known, and ∂D/∂ψ is how much more than by
-        itself the reading turns with the robot. Secants, which the effects give, are D over p.
+        itself the reading turns with the robot. Secants, which the effects give, are D over p. What follows the body is
+        laid out last, along what the others leave of the wheels' motion.
         """
-        found = Laid(view, self._turned_rad(view, values))
+        delay_s = self._delay_s(view, values)
+        seen = view if delay_s is None else replace(view, fix_delay_s=delay_s)
+        found = Laid(seen, _turned_rad(seen))
         if known is not None and found.turned_rad is known.turned_rad is None:
             found = known
-        first = sum(len(free.parameters) for free in self.effects[: found.count])
-        for free in self.effects[found.count :]:
-            last = first + len(free.parameters)
-            found = found.and_one(free, values[first:last], first)
-            first = last
-        return found
+        known_count = found.count
+        ends = np.cumsum([0, *(len(free.parameters) for free in self.effects)]).tolist()
+        spans = list(zip(self.effects, pairwise(ends), strict=True))
+        before: list[int] = []
+        for stage in STAGES:
+            here = [(free, first, last) for free, (first, last) in spans[known_count:] if free.effect.stage == stage]
+            if here and before:
+                passed = [one for one in found.placed if one.parameter in before]
+                found = replace(found, view=_after(seen, passed, values))
+            for free, first, last in here:
+                found = found.and_one(free, values[first:last], first)
+            before += [k for free, span in spans for k in range(*span) if free.effect.stage == stage]
+        return replace(found, view=seen)
 
-    def _turned_rad(self, view: DriveView, values: Floats) -> Floats | None:
-        """How far the robot turned between what each fix shows and its stamp (f,); None where no fix is old."""
+    def _delay_s(self, view: DriveView, values: Floats) -> Floats | None:
+        """How old each fix is at some values (f,); None where none is."""
         first, total = 0, np.zeros(view.fixes.t_s.size)
         for free in self.effects:
             last = first + len(free.parameters)
             delay = free.delay_s(view, values[first:last].tolist())
             total = total if delay is None else total + delay
             first = last
-        if not total.any():
-            return None
-        so_far = np.cumsum(view.steps.turn_rad)
-        now, then = (np.interp(t_s, view.steps.t_s, so_far) for t_s in (view.fixes.t_s, view.fixes.t_s - total))
-        return np.asarray(now - then)
+        return total if total.any() else None
+
+
+def _after(view: DriveView, placed: Sequence[Placed], values: Floats) -> DriveView:
+    """The drive with what some columns, scaled by parameters (m,), add to the wheels' travel or take from it."""
+    right_m, left_m = view.steps.right_m, view.steps.left_m
+    for one in placed:
+        value = values[one.parameter]
+        if one.column.port not in MOTION_PORTS or value == 0.0:
+            continue
+        more = value * one.column.values
+        if one.column.port == "turn":
+            more = 0.5 * view.steps.track_m * more
+        if one.column.port in ("right_wheel", "along", "turn"):
+            right_m = right_m + more
+        if one.column.port in ("left_wheel", "along"):
+            left_m = left_m + more
+        if one.column.port == "turn":
+            left_m = left_m - more
+    return view if right_m is view.steps.right_m and left_m is view.steps.left_m else with_travel(view, right_m, left_m)
+
+
+def _turned_rad(view: DriveView) -> Floats | None:
+    """How far the robot turned between what each fix shows and its stamp (f,); None where no fix is old."""
+    if not isinstance(view.fix_delay_s, np.ndarray):
+        return None
+    so_far, t_s = np.cumsum(view.steps.turn_rad), view.fixes.t_s
+    now, then = (np.interp(each, view.steps.t_s, so_far) for each in (t_s, t_s - view.fix_delay_s))
+    return np.asarray(now - then)
 
 
 def _turned_back(placed: Sequence[Placed], turned_rad: Floats) -> list[Placed]:

@@ -101,8 +101,9 @@ def test_the_column_of_a_high_antenna_goes_back_where_the_nose_goes_up():
     view = injected("antenna_height", (2.0,)).view
     ahead, aside = CATALOGUE["antenna_height"].columns(view, {"m": 0.0})
     assert (ahead.port, aside.port) == ("antenna_forward", "antenna_left")
-    assert ahead.values == pytest.approx(-np.sin(view.at_fixes(view.steps.pitch_rad)))
-    assert aside.values == pytest.approx(-np.sin(view.at_fixes(view.steps.roll_rad)))
+    pitch, roll = (view.at_fixes(tilt) for tilt in (view.steps.pitch_rad, view.steps.roll_rad))
+    assert ahead.values == pytest.approx(-np.sin(pitch) * np.cos(roll))
+    assert aside.values == pytest.approx(-np.sin(roll))
     assert np.ptp(ahead.values) > 0.1
     assert np.ptp(aside.values) > 0.1
 

@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 
 from sccal.effects.catalogue import CATALOGUE
+from sccal.effects.view import with_travel
 from sccal.errors import DataError, UsageError
 from sccal.evidence.extension import Free, FreeEffects, effect_by_name
-from sccal.filter.layout import PORT_ANTENNA_FORWARD, PORT_ANTENNA_LEFT
+from sccal.filter.columns import MOTION_PORTS
+from sccal.filter.layout import (
+    PORT_ALONG,
+    PORT_ANTENNA_FORWARD,
+    PORT_ANTENNA_LEFT,
+    PORT_LEFT_WHEEL,
+    PORT_RIGHT_WHEEL,
+    PORT_TURN,
+)
 from tests.effects.harness import injected
 
 IRON = (28.0, -19.0)
@@ -193,3 +202,74 @@ def test_names_are_of_the_catalogue_or_of_the_log():
         FreeEffects.named(("heading_step",))
     assert FreeEffects.named(()) is None
     assert len(FreeEffects.named(("lever_arm", "lever_arm")).effects) == 1
+
+
+# What stands between the counters and the body
+
+
+def motion_of(log, effects, values):
+    """Travel and turn of the body in each step: the wheels' and what all columns make of it."""
+    columns = FreeEffects(effects).columns_in(log.view, values, log.timeline)
+    added = dict.fromkeys(MOTION_PORTS.values(), 0.0)
+    for values_of, port, k in zip(columns.motion.T, columns.motion_port, columns.motion_param, strict=True):
+        added[int(port)] = added[int(port)] + values[k] * values_of
+    steps = log.view.steps
+    right, left = added[PORT_RIGHT_WHEEL], added[PORT_LEFT_WHEEL]
+    along = steps.along_m + added[PORT_ALONG] + 0.5 * (right + left)
+    return along, steps.turn_rad + added[PORT_TURN] + (right - left) / steps.track_m
+
+
+def test_the_ground_takes_its_share_of_the_wheels_travel_and_not_of_the_counts():
+    """Of a wheel that travels 20 % more than it says, the slip takes a share that is 20 % larger and grows with it."""
+    log = drive()
+    steps = log.view.steps
+    lost = Free(CATALOGUE["missed_right"], {"above_radps": 0.0})
+    slips = Free(CATALOGUE["speed_slip"])
+    values = np.array([0.05, 1.0 - 1.0 / 1.2])
+    along, _ = motion_of(log, (slips, lost), values)
+    travelled = with_travel(log.view, 1.2 * steps.right_m, steps.left_m).steps
+    expected = travelled.along_m * (1.0 - 0.05 * np.abs(travelled.speed_mps))
+    np.testing.assert_allclose(along, expected, atol=1e-12)
+    counted = travelled.along_m - 0.05 * steps.along_m * np.abs(steps.speed_mps)
+    assert np.abs(expected - counted).sum() > 1e-3 * np.abs(expected).sum()
+
+
+def test_an_old_fix_shows_how_the_body_moved_and_not_what_the_wheels_say():
+    """With a third of the travel lost, a fix lags by two thirds of what the wheels cover in its age."""
+    log = drive()
+    late, lost = Free(CATALOGUE["gnss_latency"]), Free(CATALOGUE["missed_right"], {"above_radps": 0.0})
+    both_lose = (late, lost, Free(CATALOGUE["missed_left"], {"above_radps": 0.0}))
+    share = 1.0 - 1.0 / (1.0 - 1.0 / 3.0)
+    values = np.array([0.5, share, share])
+    alone = FreeEffects((late,)).columns_in(log.view, values[:1], log.timeline).fix
+    beside = FreeEffects(both_lose).columns_in(log.view, values, log.timeline).fix
+    forward, slower = (np.hypot(*one.T[:2]) for one in (alone, beside))
+    np.testing.assert_allclose(slower, forward * 2.0 / 3.0, rtol=2e-2, atol=1e-3)
+
+
+def test_a_reading_of_the_heading_that_is_old_lags_by_what_the_body_turned():
+    log = drive()
+    late, slips = Free(CATALOGUE["heading_latency"]), Free(CATALOGUE["turn_slip"])
+    values = np.array([0.3, 0.4])
+    columns = FreeEffects((late, slips)).columns_in(log.view, values, log.timeline)
+    _, turn = motion_of(log, (late, slips), values)
+    turned = np.interp(log.view.headings.t_s, log.view.steps.t_s, np.cumsum(turn))
+    before = np.interp(log.view.headings.t_s - 0.3, log.view.steps.t_s, np.cumsum(turn))
+    does = columns.heading_known + columns.heading @ values[columns.heading_param]
+    inside = log.view.headings.t_s > log.view.steps.t_s[0] + 0.5
+    np.testing.assert_allclose(does[inside], (before - turned)[inside], atol=2e-3)
+    assert np.abs(turned - before).max() > 0.05
+
+
+def test_a_high_antenna_swings_as_the_robot_stood_when_an_old_fix_was_taken():
+    log = injected("antenna_height", (2.0,))
+    effects = FreeEffects((Free(CATALOGUE["gnss_latency"]), Free(CATALOGUE["antenna_height"])))
+    columns = effects.columns_in(log.view, np.array([0.4, 2.0]), log.timeline)
+    tall = columns.fix[:, columns.fix_param == 1]
+    steps = log.view.steps
+    pitch, roll = (np.interp(log.view.fixes.t_s - 0.4, steps.t_s, one) for one in (steps.pitch_rad, steps.roll_rad))
+    size = np.hypot(np.sin(pitch) * np.cos(roll), np.sin(roll))
+    # Rotated from how the robot stood then into how it stands now; the size stays.
+    ports = columns.fix_port[columns.fix_param == 1]
+    forward, left = (tall[:, ports == port].sum(axis=1) for port in (PORT_ANTENNA_FORWARD, PORT_ANTENNA_LEFT))
+    np.testing.assert_allclose(np.hypot(forward, left), size, atol=1e-9)
