@@ -5,7 +5,7 @@ See sccal.diagnose.loop for how effects are found, and sccal.diagnose.criteria f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +39,7 @@ from sccal.evidence.extension import Free, name_in
 from sccal.evidence.joint import Key
 from sccal.evidence.model import CONTRADICTED, Accepted, Model, Trust, refitted
 from sccal.evidence.nonsense import NonsenseColumn, with_nonsense
-from sccal.evidence.nuisance import sigmas_beside_small
+from sccal.evidence.nuisance import sigmas_beside_small, spread_of_shapes
 from sccal.evidence.posterior import PRICE_NATS, Posterior
 from sccal.evidence.saturated import posterior_of
 from sccal.filter.noise import Reach
@@ -85,10 +85,10 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     before = judge(loop.first, options.outage_window_s)
     told = _steps(loop, before, options.outage_window_s)
     after = told[-1].after if told else _after(loop, before, options.outage_window_s)
-    sigmas = sigmas_beside_small(loop.model) if loop.model.accepted else {}
-    findings = with_moved([_finding(loop, one, sigmas) for one in told], runs)
+    unsure = _unsure(loop)
+    findings = with_moved([_finding(loop, one, unsure) for one in told], runs)
     hidden, detectable, inseparable = excitation(loop.posterior, loop.candidates, loop.kept, loop.saturated.model)
-    parameters = _parameters(loop.model, runs)
+    parameters = _parameters(loop.model, runs, unsure.spread)
     return Diagnosis(
         runs=tuple(run.name for run in runs),
         vehicle=runs[0].vehicle,
@@ -107,8 +107,30 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
         parameters_after=parameters,
         noises=tuple(RunNoise(p.aligned.name, p.noise) for p in loop.model.problems),
         notices=tuple(notice for run in runs for notice in run.notices),
-        model=_saved(loop, runs, parameters, after, sigmas),
+        model=_saved(loop, runs, parameters, after, unsure),
     )
+
+
+@dataclass(frozen=True)
+class _Unsure:
+    """What the sigmas of the model's own fit leave out."""
+
+    beside: Mapping[Key, float]
+    """Sigmas with small amounts of all other effects allowed."""
+    spread: Floats
+    """(G, G) what shapes add that are known only so well."""
+
+    def sigmas(self, model: Model, keys: Sequence[Key], by_fit: Floats) -> Floats:
+        """Of some parameters (k,)."""
+        rows = [model.fit.places.keys.index(key) for key in keys]
+        beside = np.array([self.beside.get(key, 0.0) for key in keys])
+        return np.asarray(np.sqrt(np.maximum(by_fit, beside) ** 2 + np.diag(self.spread)[rows]))
+
+
+def _unsure(loop: Loop) -> _Unsure:
+    model = loop.model
+    beside = sigmas_beside_small(model) if model.accepted else {}
+    return _Unsure(beside, spread_of_shapes(model, loop.shape_sigmas))
 
 
 def _more_trusted(loop: Loop, runs: Sequence[Aligned], options: CalibrationOptions) -> Loop:
@@ -179,11 +201,11 @@ def _aliases(loop: Loop, one: Sized) -> tuple[str, ...]:
     return tuple(other for other in dict.fromkeys(found) if other != name)[:MOST_ALIASES]
 
 
-def _finding(loop: Loop, told: _Told, sigmas: dict[Key, float]) -> Finding:
+def _finding(loop: Loop, told: _Told, unsure: _Unsure) -> Finding:
     one = told.sized
     free = one.accepted.free
     effect = free.effect
-    parameters, per_run = _estimates(loop, one.accepted, sigmas)
+    parameters, per_run = _estimates(loop, one.accepted, unsure)
     advice = ""
     if told.aliases:
         beside = [CATALOGUE[name] for name in told.aliases if name in CATALOGUE]
@@ -209,15 +231,14 @@ def _finding(loop: Loop, told: _Told, sigmas: dict[Key, float]) -> Finding:
 
 
 def _estimates(
-    loop: Loop, accepted: Accepted, sigmas: dict[Key, float]
+    loop: Loop, accepted: Accepted, unsure: _Unsure
 ) -> tuple[dict[str, Estimate], dict[str, tuple[Estimate, ...]]]:
     """Of an effect's parameters and shapes, and of those that every run has its own of the runs' own values."""
     parameters: dict[str, Estimate] = {}
     per_run: dict[str, tuple[Estimate, ...]] = {}
     for values, by_fit, parameter in values_in(loop.model, accepted):
         keys = [key for key in loop.model.fit.places.keys if key[:2] == (accepted.key, parameter.name)]
-        beside = np.array([sigmas.get(key, 0.0) for key in keys])
-        honest = np.maximum(by_fit, beside)
+        honest = unsure.sigmas(loop.model, keys, by_fit)
         if values.size > 1:
             each = zip(values.tolist(), honest.tolist(), strict=True)
             per_run[parameter.name] = tuple(Estimate(value, sigma, "estimated") for value, sigma in each)
@@ -281,7 +302,7 @@ def _interval(windows: Sequence[OutageWindow]) -> tuple[float, float] | None:
     return float(low), float(high)
 
 
-def _parameters(model: Model, runs: Sequence[Aligned]) -> Parameters:
+def _parameters(model: Model, runs: Sequence[Aligned], spread: Floats | None = None) -> Parameters:
     finals = [one.path for one in model.fit.runs]
     offsets = np.array([found.final_state[6] for found in finals])
     middle = float(np.angle(np.exp(1j * offsets).sum()))
@@ -289,21 +310,19 @@ def _parameters(model: Model, runs: Sequence[Aligned]) -> Parameters:
     own = float(np.mean([found.final_covariance[6, 6] for found in finals]))
     scatter = float(apart.var(ddof=1)) if len(finals) > 1 else 0.0
     covariance = np.zeros((4, 4))
-    covariance[:3, :3] = model.fit.robust[:3, :3]
+    covariance[:3, :3] = model.fit.robust[:3, :3] + (0.0 if spread is None else spread[:3, :3])
     covariance[3, 3] = max(own, scatter) / len(finals)
     drive = pooled_drive([describe_drive(run, float(model.fit.mode[:2].mean())) for run in runs])
     values = np.append(model.fit.mode[:3], middle + float(apart.mean()))
     return judge_parameters(values, covariance, runs[0].vehicle, model.problems[0].options, drive)
 
 
-def _saved(
-    loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: Judged, sigmas: dict[Key, float]
-) -> SavedModel:
+def _saved(loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: Judged, unsure: _Unsure) -> SavedModel:
     """The model that was judged, for other commands to start from."""
     effects = []
     for one in loop.sized:
         accepted = one.accepted
-        estimates, _ = _estimates(loop, accepted, sigmas)
+        estimates, _ = _estimates(loop, accepted, unsure)
         effect = accepted.free.effect
         effects.append(
             SavedEffect(
