@@ -47,12 +47,14 @@ class Sized:
     """Largest parameter in units of the smallest that matters."""
     needed_nats: float = LEAST_NATS
     """What a finding must bring."""
+    beyond: str = ""
+    """A parameter that came out beyond what such an effect can be, in words."""
 
     @property
     def told(self) -> bool:
         """Whether it is a finding."""
         sure = self.worth_nats >= self.needed_nats and self.t >= LEAST_T
-        return sure and self.size >= 1.0 and self.held_out_nats > 0.0
+        return sure and self.size >= 1.0 and self.held_out_nats > 0.0 and not self.beyond
 
     @property
     def stays(self) -> bool:
@@ -60,7 +62,8 @@ class Sized:
 
         A moment, of which no other data can say anything, has to be a finding.
         """
-        return self.told or (self.worth_nats > 0.0 and 0.0 < self.held_out_nats < np.inf)
+        helps = self.worth_nats > 0.0 and 0.0 < self.held_out_nats < np.inf
+        return self.told or (helps and not self.beyond)
 
 
 @dataclass
@@ -209,17 +212,32 @@ def _take_back(loop: Loop) -> None:
 
     First under a noise that was looked at quickly, then under that of the model that is left.
     """
-    reach = Reach.LOOK
+    reach, whole = Reach.LOOK, True
     while True:
         loop.sized = sized_of(loop.model)
         weak = [one for one in loop.sized if not one.stays]
         _tell_weak(loop, weak)
         if not weak and reach is Reach.NEAR:
-            return
+            break
+        whole = whole and not weak
         gone = {one.accepted.key for one in weak}
         reach = Reach.LOOK if weak else Reach.NEAR
         rest = [one for one in loop.model.accepted if one.key not in gone]
         loop.model = refitted(loop.model, rest, reach=reach)
+    if not whole:
+        _refine_again(loop)
+
+
+def _refine_again(loop: Loop) -> None:
+    """Time constants and thresholds without what was left out, where the model is likelier with them and all holds."""
+    before = list(loop.model.accepted)
+    better = _with_shapes(loop, before)
+    if [one.key for one in better] == [one.key for one in before]:
+        return
+    model = refitted(loop.model, better, reach=Reach.NEAR)
+    sized = sized_of(model)
+    if model.nll < loop.model.nll and all(one.stays for one in sized):
+        loop.model, loop.sized = model, sized
 
 
 def need_more(loop: Loop, needed_nats: float) -> None:
@@ -235,6 +253,8 @@ def _tell_weak(loop: Loop, some: Sequence[Sized]) -> None:
 
 
 def _why(one: Sized) -> str:
+    if one.beyond:
+        return f"{one.beyond}, beyond what such an effect can be"
     kept = "; the model keeps it, as it helps on data that did not fit it" if one.stays else ""
     if one.worth_nats < one.needed_nats:
         return f"it brings {one.worth_nats:.1f} nats of evidence, and a finding needs {one.needed_nats:.1f}{kept}"
@@ -255,8 +275,18 @@ def sized_of(model: Model) -> list[Sized]:
         moments = [row for other in model.accepted if other.run is not None for row in rows_of(model, other)]
         # All evidence for a moment lies in it: no other part of the run can foretell it.
         gain = np.inf if one.run is not None else held_out_gain(model.fit, rows_of(model, one), moments)
-        found.append(Sized(one, posterior.worth(one.key, keys), gain, t, size))
+        found.append(Sized(one, posterior.worth(one.key, keys), gain, t, size, beyond=_beyond(values)))
     return found
+
+
+def _beyond(values: Sequence[tuple[Floats, Floats, Parameter]]) -> str:
+    """The first parameter whose value no such effect has: something else hides behind it."""
+    for some, _, parameter in values:
+        worst = float(some[int(np.argmax(np.abs(some)))])
+        if not parameter.lower <= worst <= parameter.upper:
+            limits = f"{parameter.lower:g} … {parameter.upper:g}"
+            return f"its {parameter.name} would be {worst:.3g} {parameter.unit}, not within {limits}"
+    return ""
 
 
 def rows_of(model: Model, accepted: Accepted) -> list[int]:

@@ -22,7 +22,7 @@ SIZES: dict[str, tuple[float, ...]] = {
     "turn_scrub": (0.1,),
     "side_slip": (0.1,),
     "speed_slip": (0.03,),
-    "speed_offset": (0.05,),
+    "speed_offset": (0.05, 0.03),
     "brake_slip": (0.05,),
     "drive_slip": (0.05,),
     "slope": (1.0,),
@@ -212,6 +212,7 @@ def test_it_is_parsed_from_the_command_line(name):
         ("hard_iron=3,4,20", {"cos_deg": 3.0, "sin_deg": 4.0, "tau_s": 20.0}),
         ("soft_iron=3,4", {"cos2_deg": 3.0, "sin2_deg": 4.0, "tau_s": 0.0}),
         ("missed_left=0.02", {"ratio": 0.02, "above_radps": 0.0}),
+        ("speed_offset=0.05", {"mps": 0.05, "above_mps": 0.02}),
         ("missed_right=0.02,8", {"ratio": 0.02, "above_radps": 8.0}),
     ],
 )

@@ -56,7 +56,7 @@ def test_the_column_of_a_speed_offset_takes_it_back():
 
 def test_a_speed_offset_lasts_from_start_to_stop():
     """A limit at the crawl itself would lose a hundredth of the time, at the ends of every leg."""
-    log = injected("speed_offset", (0.05,))
+    log = injected("speed_offset", (0.05, 0.02))
     without, with_it = (innovations(log, "speed_offset", {"mps": mps})[1] for mps in (0.0, 0.05))
     assert np.sqrt(np.mean(with_it**2)) < 0.005 * np.sqrt(np.mean(without**2))
 

@@ -10,7 +10,7 @@ import pytest
 from sccal.effects.catalogue import CATALOGUE
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model, refitted
-from sccal.evidence.nuisance import sigmas_beside_small
+from sccal.evidence.nuisance import sigmas_beside_small, spread_of_shapes
 from tests.evidence.logs import bare
 
 ARM = (0.3, -0.1)
@@ -54,3 +54,24 @@ def test_constants_of_the_vehicle_have_theirs_too(path):
     beside = sigmas_beside_small(fitted(path))
     for name in ("radius_right_m", "radius_left_m", "track_m"):
         assert 0.0 < beside["", name, -1] < 0.1
+
+
+def test_a_shape_that_is_held_a_little_off_widens_what_depends_on_it():
+    """Iron of 20 deg let in over 10 s, held at 12.5: off by many sigmas of the filter and by few of all."""
+    model = bare("hard_iron=17,-11,10", duration_s=300.0)
+    iron = Accepted(Free(CATALOGUE["hard_iron"], {"tau_s": 12.5}))
+    model = refitted(model, [iron])
+    spread = spread_of_shapes(model, {iron.key: {"tau_s": 1.5}})
+    rows = [place for place, key in enumerate(model.fit.places.keys) if key[0] == iron.key]
+    off = np.abs(model.fit.values[rows] - (17.0, -11.0))
+    plain = np.sqrt(np.diag(model.fit.covariance)[rows])
+    widened = np.sqrt(plain**2 + np.diag(spread)[rows])
+    assert (off / plain).max() > 5.0
+    assert (off / widened).max() < 3.0
+    assert np.all(np.linalg.eigvalsh(spread) > -1e-9)
+
+
+def test_a_shape_that_is_known_widens_nothing():
+    model = fitted("general")
+    assert not spread_of_shapes(model, {}).any()
+    assert not spread_of_shapes(model, {"lever_arm": {"at_s": float("nan")}}).any()
