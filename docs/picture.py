@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,7 +24,9 @@ from sccal.inspect.inspect import inspect_run
 from sccal.logs.run import discover, read_run
 from sccal.logs.write import write_text
 from sccal.report.diagnosis_figures import residual_picture
-from sccal.report.figures import BLUE, parameter_history, plain_ticks, styled, svg_text
+from sccal.report.figures import BLUE, PAPER, plain_ticks, styled, svg_text
+from sccal.report.figures_series import parameters_plan
+from sccal.report.plan import drawn
 from sccal.report.rows import Row, parameter_rows
 from sccal.results.numbers import plain
 from sccal.simulate.choose import settings_from
@@ -35,7 +38,7 @@ def calibration(logs: str) -> str:
     """The parameters of one run as the filter learns them."""
     (source,) = discover([Path(logs)])
     found, _ = calibrate_run(read_run(source), CalibrationOptions())
-    return parameter_history(found)
+    return drawn(parameters_plan(found)).svg
 
 
 def diagnosis(logs: str) -> str:
@@ -44,6 +47,16 @@ def diagnosis(logs: str) -> str:
     picture = found.findings[0].picture
     assert picture is not None
     return residual_picture(picture)
+
+
+_OF_THE_PAGE = re.compile(r"var\(--[a-z]+,([^()]*)\)")
+"""A value that a page may choose, and the one that holds where there is no page."""
+
+
+def standing_alone(svg: str) -> str:
+    """The figure without a page around it: with colours and letters of its own, on white paper."""
+    head, body = _OF_THE_PAGE.sub(r"\1", svg).split(">", 1)
+    return f'{head}>\n<rect width="100%" height="100%" fill="{PAPER}"/>{body}'
 
 
 DRIVES = ("straight", "circle", "rows", "rectangle", "figure8", "calibration")
@@ -88,6 +101,8 @@ def shown(row: Row) -> str:
     return f"± {plain(scale * row.estimate.sigma, 2)} {unit}"
 
 
+PICTURES = {"calibration": calibration, "diagnosis": diagnosis, "drives": drives}
+
 if __name__ == "__main__":
     kind, *logs, picture = sys.argv[1:]
-    write_text(Path(picture), {"calibration": calibration, "diagnosis": diagnosis, "drives": drives}[kind](*logs))
+    write_text(Path(picture), standing_alone(PICTURES[kind](*logs)))
