@@ -13,12 +13,32 @@ Conventions, valid everywhere in this package
 
 Rooms, ground floor first; imports point down only
 --------------------------------------------------
-errors · arrays · compiled · geodesy · randomness · logs (bytes to streams, and back) · align (streams to one timeline
-of events), simulate, degrade and convert (logs with known truth, with a fault, in another format) · effects (one file
-each) · filter (the compiled kernel, the noise) · evidence (several runs as one problem, the evidence of any set of
-effects) · calibration (one run, several runs, outages, held-out drift) · diagnose (what the model lacks), experiments
-(the paper's), inspect (what is in a log) · results (what files hold) · summary, gates, compare, export (work on
-results) · report (text, json, yaml, figures, html; computes nothing) · batch, samples · cli (parse, call, print)
+0   errors       Every failure that a user can act on, as one line and one exit code.
+0   arrays       The names of the array types.
+0   compiled     Compilation to machine code, with a cache that cannot go stale.
+1   geodesy      The local tangent plane: latitude and longitude to metres, and back.
+1   randomness   Named streams of random numbers, and the errors made of them.
+1   logs         From the bytes of a log to streams, and back.
+2   align        From streams to one timeline of events on one clock.
+2   convert      Runs from one form of log into another.
+2   simulate     A robot that never was, and the logs that it would have written.
+2   degrade      Existing logs rewritten with a fault, everything else byte for byte as it was.
+3   effects      What a real robot may have that the paper's model lacks, one file each.
+4   filter       The compiled filter, where it starts, and the noise that it assumes.
+5   evidence     Several runs as one problem, and what the data say of any set of effects.
+6   calibration  The constants of one run and of several, their statuses, and the outages that judge them.
+7   diagnose     The search for what the model lacks, judged before and after.
+7   experiments  The paper's experiments, with simulated drives and with one's own.
+7   inspect      What is in a log, before anything is estimated.
+8   results      Results as their files tell them.
+9   summary      Many calibrations as one picture.
+9   gates        Conditions that results must keep, and whether they do.
+9   compare      What changed between two results beyond its uncertainty.
+9   export       Results in the formats of other tools.
+10  report       Results as text, JSON, YAML, figures and pages; nothing is computed there.
+11  batch        Many runs in one call, none stopped by another's failure.
+11  samples      The sample logs, the same bytes every time.
+12  cli          The command line: parse, call, print, exit code.
 
 The model is that of L. Cantelli, S. Ligama, G. Muscato, D. Spina, "Auto-Calibration Methods of Kinematic Parameters
 and Magnetometer Offset for the Localization of a Tracked Mobile Robot", Robotics 2016, 5(4), 23.

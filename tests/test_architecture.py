@@ -100,11 +100,15 @@ def test_every_room_stands_on_one_floor():
     assert sorted(floors) == sorted(rooms())
 
 
-def test_every_room_stands_in_the_packages_docstring():
-    """Among its words, as "filter (the compiled kernel, …)" or "simulate and degrade"."""
-    listed = sccal.__doc__.split("Rooms, ground floor first")[1].split("\n\n")[0]
-    named = set(re.findall(r"[a-z_]+", re.sub(r"\([^()]*\)", "", listed)))
-    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} - named == set()
+def test_the_packages_docstring_lists_every_room_on_its_floor():
+    listed = re.findall(r"^(\d+) +(\w+) +(.*)$", sccal.__doc__, re.MULTILINE)
+    floors = [int(floor) for floor, _, _ in listed]
+    assert floors == sorted(floors)
+    assert {room for _, room, _ in listed} == rooms()
+    assert sorted(zip(floors, (room for _, room, _ in listed), strict=True)) == sorted(
+        (number, room) for number, floor in enumerate(FLOORS) for room in floor
+    )
+    assert [room for _, room, what in listed if not re.fullmatch(r"[A-Z].*\.", what)] == []
 
 
 def test_imports_are_found_wherever_they_stand():
