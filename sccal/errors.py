@@ -53,12 +53,6 @@ class DataError(SccalError):
     exit_code = Exit.DATA
 
 
-class NothingMatchedError(SccalError):
-    """A pattern or filter selected nothing."""
-
-    exit_code = Exit.NOTHING_MATCHED
-
-
 class Interrupted(SccalError):  # noqa: N818 (nothing went wrong)
     """The user stopped it; the message says what is done and how to go on."""
 

@@ -16,11 +16,6 @@ class Terrain:
 
     waves: tuple[tuple[float, float, float, float], ...] = ()
 
-    @property
-    def is_level(self) -> bool:
-        """Whether there are no hills."""
-        return not self.waves
-
     def gradient_at(self, east_m: float, north_m: float) -> tuple[float, float]:
         """Slope towards the east and towards the north at one place: ∇h of h = Σ (slope / |k|) sin(k · x + phase)."""
         rise_east = rise_north = 0.0

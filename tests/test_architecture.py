@@ -31,6 +31,8 @@ FLOORS = (
     {"cli"},
 )
 """Ground floor first; a room imports from lower floors only."""
+BESIDE = ("docs", "studies", "benchmarks", "fuzz")
+"""Code that uses the package and is no test of it."""
 FREE = {"__init__", "__main__"}
 MAY_IMPORT = {
     "simulate": {"errors", "arrays", "randomness", "geodesy", "logs"},
@@ -207,6 +209,48 @@ def test_everything_public_says_what_it_is(path):
 @each_module
 def test_modules_are_read_in_one_sitting(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_MODULE
+
+
+def names_defined(tree: ast.Module) -> Iterator[tuple[str, ast.stmt]]:
+    """What a module defines at its first level, but for what a decorator has handed to others."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            if not (node.decorator_list and isinstance(node, ast.FunctionDef)):
+                yield node.name, node
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            yield from ((one.id, node) for target in targets for one in ast.walk(target) if isinstance(one, ast.Name))
+
+
+def names_loaded(node: ast.AST) -> set[str]:
+    """Names read in some code."""
+    return {one.id for one in ast.walk(node) if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Load)}
+
+
+@pytest.fixture(scope="module")
+def names_used_elsewhere() -> set[str]:
+    """Full names that anything but a test imports, for type checkers too, and all names that stand after a dot."""
+    root = PACKAGE.parent
+    trees = [parsed(path) for room in ("sccal", *BESIDE) for path in sorted((root / room).rglob("*.py"))]
+    every = [node for tree in trees for node in ast.walk(tree)]
+    return {node.attr for node in every if isinstance(node, ast.Attribute)} | {
+        f"{node.module}.{alias.name}" for node in every if isinstance(node, ast.ImportFrom) for alias in node.names
+    }
+
+
+@each_module
+def test_nothing_is_kept_that_nobody_uses(path, names_used_elsewhere):
+    tree = parsed(path)
+    module = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+    loaded = [(node, names_loaded(node)) for node in tree.body]
+    unused = [
+        name
+        for name, node in names_defined(tree)
+        if not name.startswith("__")
+        and not {name, f"{module}.{name}"} & names_used_elsewhere
+        and not any(name in names for other, names in loaded if other is not node)
+    ]
+    assert unused == []
 
 
 def test_modules_are_named_after_something():

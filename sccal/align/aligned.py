@@ -33,7 +33,7 @@ from sccal.align.reference import (
 )
 from sccal.align.signs import check_signs
 from sccal.align.smooth import without_white_noise
-from sccal.align.standing import Spans, dither_rad, moving_spans, standing_spans
+from sccal.align.standing import Spans, dither_rad, standing_spans
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
@@ -115,11 +115,6 @@ class Aligned:
         """Stretches of some seconds and more in which both wheels stand."""
         most_rad = dither_rad(self.vehicle.wheel_radius_m, self.vehicle.ticks_per_rev)
         return standing_spans(self.wheel_t_s, self.right_rad, self.left_rad, self.loose, most_rad)
-
-    @property
-    def moving_spans_s(self) -> Spans:
-        """Stretches in which the robot drives, short stops included: where the levels of the noise are to be learnt."""
-        return moving_spans(self.span_s, self.standing_s)
 
     @property
     def span_s(self) -> tuple[float, float]:

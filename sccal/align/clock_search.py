@@ -42,7 +42,6 @@ class Lag:
 
     offset_s: float
     skew: float
-    coherence: float
     explained: float
     """−N log(1 − γ²)."""
 
@@ -140,4 +139,4 @@ def _lags_at(wheels: WheelPath, fixes: Fixes, skew: float, window_s: float) -> l
     peaks = peaks[np.argsort(-explained[peaks])[:24]]
     starts = float(wheels.t_s[0] - t_s[0])
     first = -(d_fix.size - 1)
-    return [Lag(starts + float(k + first) * GRID_S, skew, float(coherence[k]), float(explained[k])) for k in peaks]
+    return [Lag(starts + float(k + first) * GRID_S, skew, float(explained[k])) for k in peaks]

@@ -25,8 +25,6 @@ DITHER_COUNTS = 1.5
 DITHER_M = 1e-3
 """And where counts are finer: an engine that idles and a hand on the robot turn a wheel by so much, a drive at any
 speed above DITHER_M / STAND_S = 0.5 mm/s by more."""
-SHORT_STOP_S = 30.0
-"""Errors of an AHRS last 10 to 30 s: a shorter stop between two drives tells nothing that they do not."""
 
 
 def dither_rad(wheel_radius_m: float, ticks_per_rev: float | None) -> float:
@@ -72,14 +70,6 @@ def _extremes(angle: Floats, before: Ints, at_edge: Floats) -> tuple[Floats, Flo
         low[filled] = np.minimum(low[filled], np.minimum.reduceat(within, before[filled]))
         high[filled] = np.maximum(high[filled], np.maximum.reduceat(within, before[filled]))
     return low, high
-
-
-def moving_spans(span_s: tuple[float, float], standing_s: Spans) -> Spans:
-    """What is left of the span between stands of SHORT_STOP_S and more."""
-    long = [(a, b) for a, b in standing_s if b - a >= SHORT_STOP_S]
-    starts = [span_s[0], *(b for _, b in long)]
-    ends = [*(a for a, _ in long), span_s[1]]
-    return tuple((start, end) for start, end in zip(starts, ends, strict=True) if end > start)
 
 
 def rows_in_stands(t_s: Floats, standing_s: Spans) -> tuple[Ints, Ints]:

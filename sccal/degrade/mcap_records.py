@@ -17,7 +17,7 @@ from sccal.logs.mcap_file import Channel
 from sccal.logs.mcap_magic import MAGIC
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
-_ATTACHMENT, _ATTACHMENT_INDEX, _STATISTICS, _METADATA, _METADATA_INDEX = 9, 10, 11, 12, 13
+_ATTACHMENT_INDEX, _STATISTICS, _METADATA_INDEX = 10, 11, 13
 _SUMMARY_OFFSET, _DATA_END = 14, 15
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")

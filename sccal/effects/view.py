@@ -70,7 +70,6 @@ class DriveView:
     """How old each fix is as far as known (f,): it shows the robot as it stood so long before its stamp."""
     logged: Mapping[str, Series] = field(default_factory=dict)
     """The log's further columns."""
-    has_tilt: bool = False
 
     @property
     def step_yaw_rad(self) -> Floats:
@@ -166,7 +165,6 @@ def view_drive(
         headings=moments(aligned.heading_t_s[timeline.heading_index]),
         fixes=moments(aligned.fix_t_s[timeline.fix_index]),
         logged=aligned.extras,
-        has_tilt=pitch is not None and roll is not None,
     )
 
 

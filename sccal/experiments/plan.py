@@ -25,7 +25,6 @@ Variant = Literal["without", "with"]
 VARIANTS: tuple[Variant, ...] = ("without", "with")
 """The paper's SC EKF, and SC EKF with offset estimation."""
 PATHS: tuple[PathName, ...] = ("rectangle", "circle", "general")
-DURATION_S = 600.0
 FIXES_FIRST_S = 40.0
 """So long the noisy experiments begin with good fixes; at most a fifth of the run."""
 TOLERANCE_PERCENT = 1.0

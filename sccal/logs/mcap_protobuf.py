@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from sccal.logs.mcap_layout import MOST_FIELDS, MalformedError, Place, Shape
 
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
-_DOUBLE, _FLOAT, _STRING, _MESSAGE, _BYTES_FIELD = 1, 2, 9, 11, 12
+_STRING, _MESSAGE, _BYTES_FIELD = 9, 11, 12
 _KINDS = {
     1: "<f8",
     2: "<f4",

@@ -10,9 +10,7 @@ import pytest
 from sccal.align import align, build_timeline
 from sccal.align.standing import (
     FIRST_S,
-    SHORT_STOP_S,
     dither_rad,
-    moving_spans,
     standing_spans,
     worth_taking,
 )
@@ -108,14 +106,6 @@ def test_a_moment_shows_nothing():
     assert spans(*wheels((1.5, 0.0))) == ()
 
 
-def test_moving_is_what_is_left_between_long_stands():
-    short, long = (10.0, 10.0 + 0.9 * SHORT_STOP_S), (100.0, 100.0 + 2.0 * SHORT_STOP_S)
-    assert moving_spans((0.0, 300.0), (short, long)) == ((0.0, long[0]), (long[1], 300.0))
-    assert moving_spans((0.0, 300.0), ()) == ((0.0, 300.0),)
-    assert moving_spans((0.0, 300.0), ((0.0, 100.0), (200.0, 300.0))) == ((100.0, 200.0),)
-    assert moving_spans((0.0, 300.0), ((0.0, 300.0),)) == ()
-
-
 def test_a_stand_keeps_its_first_moments_and_one_reading_an_octave():
     t_s = np.arange(0.0, 4000.0, 0.1)
     taken = t_s[worth_taking(t_s, ((100.0, 3700.0),), 0.0)]
@@ -191,7 +181,6 @@ def test_hours_of_parking_cost_no_events(parked, held):
     assert long.heading_index.size < short.heading_index.size + 50
     ((begin_s, end_s),) = [span for span in aligned.standing_s if span[1] - span[0] > 100.0]
     assert end_s - begin_s == pytest.approx(1200.0, abs=10.0)
-    assert aligned.moving_spans_s == ((end_s, aligned.span_s[1]),)
 
 
 def test_no_wheel_motion_is_lost_over_a_stand(parked):
