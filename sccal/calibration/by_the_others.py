@@ -17,6 +17,7 @@ from sccal.calibration.result import Calibration, HeldOut, OutageWindow
 from sccal.calibration.shared import SharedLikelihood, pooled
 from sccal.evidence.model import timeline_of, trust_in
 from sccal.filter.iterate import At, RunProblem
+from sccal.filter.layout import CONSTANTS, OFFSET, THETA
 from sccal.filter.start import Constants
 
 
@@ -52,11 +53,11 @@ def windows_by_others(
     run_problem = replace(problem, timeline=timeline, options=replace(problem.options, soft_gate=True))
     run = run_problem.begun(At(Constants.of(said.mode), np.zeros(0)), linearise_there=True)
     whole = run.belief.covariance()
-    whole[3:6, 3:6] = said.covariance
+    whole[CONSTANTS, CONSTANTS] = said.covariance
     x = run.belief.x
-    if problem.options.with_offset and said.offset_var_rad2 < whole[6, 6]:
-        x[2] += x[6] - said.offset_rad
-        x[6], whole[6, 6] = said.offset_rad, said.offset_var_rad2
+    if problem.options.with_offset and said.offset_var_rad2 < whole[OFFSET, OFFSET]:
+        x[THETA] += x[OFFSET] - said.offset_rad
+        x[OFFSET], whole[OFFSET, OFFSET] = said.offset_rad, said.offset_var_rad2
     run.belief = run.belief.begun(whole)
     return run_with_outages(run, problem.aligned, problem.start, window_s).windows
 

@@ -23,6 +23,7 @@ from sccal.evidence.model import Model
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem
+from sccal.filter.layout import BASE_STATES, CONSTANTS, OFFSET, THETA
 from sccal.filter.start import Constants
 
 STRETCHES = 4
@@ -129,7 +130,7 @@ def _on_others(model: Model, run: int, window_s: float) -> Judged:
         if values.size:
             theta[place], variance = expected_of_one_more(values)
             covariance[place, place] = min(variance, covariance[place, place])
-    offsets = np.array([model.path(k).final_state[6] for k in others])
+    offsets = np.array([model.path(k).final_state[OFFSET] for k in others])
     middle = float(np.angle(np.exp(1j * offsets).sum()))
     apart, variance = expected_of_one_more(np.angle(np.exp(1j * (offsets - middle))))
     return _judged(
@@ -192,13 +193,13 @@ def _judged(
     """
     at = At(Constants.of(theta), theta[3:], path if problem.extra else None)
     run = problem.begun(at, linearise_there=True)
-    learnt = np.r_[3:6, 10 : run.states]
+    learnt = np.r_[CONSTANTS, BASE_STATES : run.states]
     whole = run.belief.covariance()
     whole[np.ix_(learnt, learnt)] = covariance
     x = run.belief.x
-    if offset is not None and problem.options.with_offset and offset[1] < whole[6, 6]:
-        x[2] += x[6] - offset[0]
-        x[6], whole[6, 6] = offset
+    if offset is not None and problem.options.with_offset and offset[1] < whole[OFFSET, OFFSET]:
+        x[THETA] += x[OFFSET] - offset[0]
+        x[OFFSET], whole[OFFSET, OFFSET] = offset
     run.belief = run.belief.begun(whole)
     outage = run_with_outages(run, problem.aligned, problem.start, window_s)
     windows = tuple(w for w in outage.windows if w.start_s >= stretch[0] - 1e-6 and w.end_s <= stretch[1] + 1e-6)

@@ -17,6 +17,7 @@ from sccal.calibration.result import Calibration
 from sccal.evidence.joint import RunLikelihood, at_least, between_runs, disagreement
 from sccal.filter.forward import numeric_limits
 from sccal.filter.iterate import At, RunProblem
+from sccal.filter.layout import CONSTANTS
 from sccal.filter.start import Constants
 
 FAR_SIGMAS = 3.0
@@ -45,7 +46,7 @@ class SharedLikelihood:
     def of(cls, problem: RunProblem, at: Floats) -> SharedLikelihood:
         """Of a run without effects, linearised at R_r, R_l and L."""
         found = RunLikelihood.of(problem, At(Constants.of(at), np.zeros(0)))
-        covariance = found.path.final_covariance[3:6, 3:6]
+        covariance = found.path.final_covariance[CONSTANTS, CONSTANTS]
         return cls(found.precision, found.vector, covariance, problem.prior, problem.prior_mean, at)
 
 

@@ -42,6 +42,7 @@ from sccal.evidence.nonsense import NonsenseColumn, with_nonsense
 from sccal.evidence.nuisance import sigmas_beside_small, spread_of_shapes
 from sccal.evidence.posterior import PRICE_NATS, Posterior
 from sccal.evidence.saturated import posterior_of
+from sccal.filter.layout import OFFSET
 from sccal.filter.noise import Reach
 
 BOOTSTRAP = 400
@@ -304,10 +305,10 @@ def _interval(windows: Sequence[OutageWindow]) -> tuple[float, float] | None:
 
 def _parameters(model: Model, runs: Sequence[Aligned], spread: Floats | None = None) -> Parameters:
     finals = [one.path for one in model.fit.runs]
-    offsets = np.array([found.final_state[6] for found in finals])
+    offsets = np.array([found.final_state[OFFSET] for found in finals])
     middle = float(np.angle(np.exp(1j * offsets).sum()))
     apart = np.angle(np.exp(1j * (offsets - middle)))
-    own = float(np.mean([found.final_covariance[6, 6] for found in finals]))
+    own = float(np.mean([found.final_covariance[OFFSET, OFFSET] for found in finals]))
     scatter = float(apart.var(ddof=1)) if len(finals) > 1 else 0.0
     covariance = np.zeros((4, 4))
     covariance[:3, :3] = model.fit.robust[:3, :3] + (0.0 if spread is None else spread[:3, :3])

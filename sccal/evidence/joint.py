@@ -25,6 +25,7 @@ from sccal.evidence.extension import FreeEffects
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass, numeric_limits
 from sccal.filter.iterate import MOST_HALVINGS, WORSE_NATS, At, RunProblem, whole_nll
+from sccal.filter.layout import BASE_STATES, CONSTANTS
 from sccal.filter.start import Constants
 
 MAX_ROUNDS = 4
@@ -96,7 +97,7 @@ class RunLikelihood:
 
 def _learnt(covariance: Floats, state: Floats) -> tuple[Floats, Floats]:
     """Precision and vector of R_r, R_l, L and the effects, from a filter's whole belief."""
-    rows = np.r_[3:6, 10 : state.size]
+    rows = np.r_[CONSTANTS, BASE_STATES : state.size]
     precision = _inverse(covariance[np.ix_(rows, rows)])
     return precision, precision @ state[rows]
 

@@ -15,15 +15,25 @@ from sccal.filter import kernel
 from sccal.filter.columns import kernel_columns
 from sccal.filter.layout import (
     BASE_STATES,
+    CONSTANTS,
+    EAST_BIAS,
+    HEADING_BIAS,
     MEM_FIX_T,
     MEM_RECOVERIES,
     MEMORY_SIZE,
+    NORTH_BIAS,
+    OFFSET,
+    RADIUS_LEFT,
+    RADIUS_RIGHT,
     REPORTED_STATES,
+    THETA,
+    TRACK,
     Belief,
     Columns,
     Events,
     Model,
     Output,
+    Y,
 )
 from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
@@ -142,17 +152,17 @@ class Filter:
         options = self.options
         offset = start.offset_rad if options.with_offset else 0.0
         x = np.zeros(BASE_STATES)
-        x[:3] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
-        x[3:6] = constants.as_array()
-        x[6] = offset
+        x[: THETA + 1] = start.east_m, start.north_m, start.yaw_rad + start.offset_rad - offset
+        x[CONSTANTS] = constants.as_array()
+        x[OFFSET] = offset
         variance = np.zeros(self.states)
-        variance[:2] = start.sigma_position_m**2
-        variance[2] = start.sigma_yaw_rad**2
-        variance[6] = options.offset_prior_rad**2 if options.with_offset else 0.0
-        variance[7] = self.model.heading_coloured_var
-        variance[8:10] = self.model.fix_coloured_var
+        variance[: Y + 1] = start.sigma_position_m**2
+        variance[THETA] = start.sigma_yaw_rad**2
+        variance[OFFSET] = options.offset_prior_rad**2 if options.with_offset else 0.0
+        variance[HEADING_BIAS] = self.model.heading_coloured_var
+        variance[EAST_BIAS : NORTH_BIAS + 1] = self.model.fix_coloured_var
         covariance = np.diag(variance)
-        learnt = np.r_[3:6, BASE_STATES : self.states]
+        learnt = np.r_[CONSTANTS, BASE_STATES : self.states]
         covariance[np.ix_(learnt, learnt)] = prior
         self.belief = self.belief._replace(x=x, p=values.copy()).begun(covariance)
         self.memory[:] = 0.0
@@ -241,9 +251,9 @@ def numeric_limits(centre: Constants) -> tuple[Floats, Floats]:
 def make_model(centre: Constants, options: FilterOptions, noise: Noise, linear_at: Constants | None = None) -> Model:
     """The kernel's numbers; without ``linear_at``, derivatives are taken at the running estimate."""
     walk = np.zeros(BASE_STATES)
-    walk[3:5] = (options.radius_walk * centre.radius_right_m) ** 2
-    walk[5] = (options.track_walk * centre.track_m) ** 2
-    walk[6] = options.offset_walk_rad**2 if options.with_offset else 0.0
+    walk[RADIUS_RIGHT : RADIUS_LEFT + 1] = (options.radius_walk * centre.radius_right_m) ** 2
+    walk[TRACK] = (options.track_walk * centre.track_m) ** 2
+    walk[OFFSET] = options.offset_walk_rad**2 if options.with_offset else 0.0
     lower, upper = numeric_limits(centre)
     outside = math.erfc(options.gate_sigmas / math.sqrt(2.0))
     return Model(

@@ -19,7 +19,7 @@ from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.filter.columns import kernel_columns
 from sccal.filter.forward import Filter, ForwardPass, numeric_limits, prior_covariance
-from sccal.filter.layout import BASE_STATES, Columns
+from sccal.filter.layout import BASE_STATES, WITH_OFFSET, Columns
 from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, find_start, first_constants
@@ -290,10 +290,10 @@ def prior_shift_nats(problem: RunProblem, at: At, found: ForwardPass) -> float:
 
 def reported_values(found: ForwardPass) -> Floats:
     """R_r, R_l, L, Ofs and the extension's parameters (4 + m,) after the last event."""
-    return np.concatenate((found.final_state[3:7], found.final_state[BASE_STATES:]))
+    return np.concatenate((found.final_state[WITH_OFFSET], found.final_state[BASE_STATES:]))
 
 
 def reported_covariance(found: ForwardPass) -> Floats:
     """Covariance of the same (4 + m, 4 + m)."""
-    rows = np.r_[3:7, BASE_STATES : found.final_state.size]
+    rows = np.r_[WITH_OFFSET, BASE_STATES : found.final_state.size]
     return np.asarray(found.final_covariance[np.ix_(rows, rows)])

@@ -69,8 +69,10 @@ from sccal.filter.layout import (
     MEM_RECOVERIES,
     NORTH_BIAS,
     OFFSET,
+    RADIUS_RIGHT,
     REPORTED_STATES,
     THETA,
+    TRACK,
     Belief,
     Columns,
     Events,
@@ -123,7 +125,7 @@ def _open_position(belief: Belief, nu_e: float, nu_n: float, level: float, use_o
             P[OFFSET, THETA] -= turn
             P[OFFSET, OFFSET] += turn
     if level >= 3:
-        for q in range(3, 6):
+        for q in range(RADIUS_RIGHT, TRACK + 1):
             P[q, q] += (0.05 * x[q]) ** 2
 
 
@@ -290,7 +292,7 @@ def forward(
         dt = t - t_before
         t_before = t
         if dt > 0.0:
-            for q in range(3, 7):
+            for q in range(RADIUS_RIGHT, OFFSET + 1):
                 P[q, q] += walk[q] * dt
         right = events.right_rad[i]
         left = events.left_rad[i]

@@ -11,6 +11,8 @@ from sccal.arrays import Bools, Floats, Rows
 X, Y, THETA, RADIUS_RIGHT, RADIUS_LEFT, TRACK, OFFSET, HEADING_BIAS, EAST_BIAS, NORTH_BIAS = range(10)
 BASE_STATES = 10
 REPORTED_STATES = 7
+CONSTANTS, WITH_OFFSET = slice(RADIUS_RIGHT, TRACK + 1), slice(RADIUS_RIGHT, OFFSET + 1)
+"""What is learnt for good: R_r, R_l and L; and the heading offset after them."""
 
 PORT_ALONG, PORT_SIDE, PORT_TURN, PORT_RIGHT_WHEEL, PORT_LEFT_WHEEL = range(5)
 PORT_ANTENNA_FORWARD, PORT_ANTENNA_LEFT, PORT_EAST, PORT_NORTH = range(4)

@@ -101,22 +101,22 @@ def move(
     # F differs from the identity in the three pose rows: left factor, right factor, mirror image.
     S, T = work[3], work[4]
     for q in range(BASE_STATES):
-        S[q] = gs3 * P[3, q] + gs4 * P[4, q]
-        T[q] = gt3 * P[3, q] + gt4 * P[4, q] + gt5 * P[5, q]
+        S[q] = gs3 * P[RADIUS_RIGHT, q] + gs4 * P[RADIUS_LEFT, q]
+        T[q] = gt3 * P[RADIUS_RIGHT, q] + gt4 * P[RADIUS_LEFT, q] + gt5 * P[TRACK, q]
     for q in range(BASE_STATES):
-        P[0, q] += ax * P[2, q] + cm * S[q] + hx * T[q]
-        P[1, q] += ay * P[2, q] + sm * S[q] + hy * T[q]
-        P[2, q] += T[q]
-    for i in range(3):
-        gsi = gs3 * P[i, 3] + gs4 * P[i, 4]
-        gti = gt3 * P[i, 3] + gt4 * P[i, 4] + gt5 * P[i, 5]
-        theta = P[i, 2]
-        P[i, 0] += ax * theta + cm * gsi + hx * gti
-        P[i, 1] += ay * theta + sm * gsi + hy * gti
-        P[i, 2] = theta + gti
-    P[1, 0] = P[0, 1]
-    P[2, 0] = P[0, 2]
-    P[2, 1] = P[1, 2]
+        P[X, q] += ax * P[THETA, q] + cm * S[q] + hx * T[q]
+        P[Y, q] += ay * P[THETA, q] + sm * S[q] + hy * T[q]
+        P[THETA, q] += T[q]
+    for i in range(RADIUS_RIGHT):
+        gsi = gs3 * P[i, RADIUS_RIGHT] + gs4 * P[i, RADIUS_LEFT]
+        gti = gt3 * P[i, RADIUS_RIGHT] + gt4 * P[i, RADIUS_LEFT] + gt5 * P[i, TRACK]
+        theta = P[i, THETA]
+        P[i, X] += ax * theta + cm * gsi + hx * gti
+        P[i, Y] += ay * theta + sm * gsi + hy * gti
+        P[i, THETA] = theta + gti
+    P[Y, X] = P[X, Y]
+    P[THETA, X] = P[X, THETA]
+    P[THETA, Y] = P[Y, THETA]
 
     # By the motion freed of slip: weights that grow with the slip itself would favour what slipped forward.
     var_right = slip2 * abs(at_right * right_clear) + loose
@@ -124,22 +124,22 @@ def move(
     qss = 0.25 * (var_right + var_left)
     qtt = (var_right + var_left) * inv_track * inv_track
     qst = 0.5 * (var_right - var_left) * inv_track
-    P[0, 0] += cm * cm * qss + 2.0 * cm * hx * qst + hx * hx * qtt
-    P[1, 1] += sm * sm * qss + 2.0 * sm * hy * qst + hy * hy * qtt
-    P[2, 2] += qtt
+    P[X, X] += cm * cm * qss + 2.0 * cm * hx * qst + hx * hx * qtt
+    P[Y, Y] += sm * sm * qss + 2.0 * sm * hy * qst + hy * hy * qtt
+    P[THETA, THETA] += qtt
     xy = cm * sm * qss + (cm * hy + sm * hx) * qst + hx * hy * qtt
     xt = cm * qst + hx * qtt
     yt = sm * qst + hy * qtt
-    P[0, 1] += xy
-    P[1, 0] += xy
-    P[0, 2] += xt
-    P[2, 0] += xt
-    P[1, 2] += yt
-    P[2, 1] += yt
-    for q in range(3, BASE_STATES):
-        P[q, 0] = P[0, q]
-        P[q, 1] = P[1, q]
-        P[q, 2] = P[2, q]
+    P[X, Y] += xy
+    P[Y, X] += xy
+    P[X, THETA] += xt
+    P[THETA, X] += xt
+    P[Y, THETA] += yt
+    P[THETA, Y] += yt
+    for q in range(RADIUS_RIGHT, BASE_STATES):
+        P[q, X] = P[X, q]
+        P[q, Y] = P[Y, q]
+        P[q, THETA] = P[THETA, q]
 
     x[X] += s * cm - side * sm
     x[Y] += s * sm + side * cm
