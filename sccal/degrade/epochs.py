@@ -22,6 +22,7 @@ from sccal.degrade.layouts import (
     Layout,
     layout_of,
 )
+from sccal.logs.nmea_positions import stated_quality
 from sccal.logs.sentences import Kind, Sentences
 
 _DAY_S = 86400.0
@@ -238,23 +239,19 @@ def _angle(part: Sentences, layout: Layout, field: int, sides: bytes, limit_deg:
 
 def _quality(part: Sentences, layout: Layout) -> Ints:
     """The GGA quality (k,) that the sentences state; -1 where they state none."""
+    if layout.read_as is not None:
+        return stated_quality(part, layout.read_as)
     begin, end = part.span(layout.quality)
     quality = np.full(begin.size, _NOT_STATED, dtype=np.int64)
     first = part.data[begin]
     first = np.where((first >= ord("a")) & (first <= ord("z")), first - 32, first)
     second = part.data[np.minimum(begin + 1, part.data.size - 1)] & 0xDF if layout.claim == "pubx" else first
-    if layout.claim == "modes":
-        for letter, code in READ_AS["mode"].items():
-            for place in range(int((end - begin).max(initial=0))):
-                here = (begin + place < end) & (part.data[np.minimum(begin + place, end)] == ord(letter))
-                quality = np.where(here, np.maximum(quality, code), quality)
-    else:
-        length = 2 if layout.claim == "pubx" else 1
-        for text, code in READ_AS[layout.claim].items():
-            same = (end - begin == length) & (first == ord(text[0]))
-            if length == 2:
-                same &= second & 0xDF == ord(text[1]) & 0xDF
-            quality[same] = code
+    length = 2 if layout.claim == "pubx" else 1
+    for text, code in READ_AS[layout.claim].items():
+        same = (end - begin == length) & (first == ord(text[0]))
+        if length == 2:
+            same &= second & 0xDF == ord(text[1]) & 0xDF
+        quality[same] = code
     if layout.status is not None:
         quality[part.letter(layout.status) != ord("A")] = 0
     return quality

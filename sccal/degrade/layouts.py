@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sccal.arrays import Bools, Ints
 from sccal.degrade.quality import MODE_LETTERS
+from sccal.logs.nmea_positions import KIND_NAMES, POSITION_KINDS
 from sccal.logs.sentences import Kind, Sentences
 
 Claim = Literal["gga", "mode", "modes", "ggk", "ksxt", "pashr", "pubx"]
@@ -33,14 +34,11 @@ CLAIMS: dict[str, dict[int, str]] = {
 }
 """How each way of stating the quality writes a GGA quality."""
 READ_AS: dict[str, dict[str, int]] = {
-    "gga": {str(code): code for code in range(10)},
     "mode": {"N": 0, "A": 1, "D": 2, "P": 3, "R": 4, "F": 5, "E": 6, "M": 7, "S": 8},
-    "ggk": {"0": 0, "1": 1, "2": 5, "3": 4, "4": 2, "5": 2},
-    "ksxt": {"0": 0, "1": 1, "2": 5, "3": 4},
     "pashr": {"0": 1, "1": 2, "2": 5, "3": 4},
     "pubx": {"NF": 0, "DR": 6, "G2": 1, "G3": 1, "D2": 2, "D3": 2, "RK": 6, "TT": 0},
 }
-"""And how it is read back."""
+"""And how it is read back, where ``sccal.logs`` does not read it."""
 
 
 @dataclass(frozen=True)
@@ -69,11 +67,16 @@ class Layout:
     from_base: tuple[int, int] | None = None
     """Fields with the position east and north of the base, m."""
 
+    @property
+    def read_as(self) -> Kind | None:
+        """The kind as which ``sccal.logs`` reads positions out of it, if it does."""
+        return next((kind for kind in POSITION_KINDS if KIND_NAMES[kind] == self.name), None)
+
 
 LAYOUTS = (
     Layout("GGA", 1, 2, 4, "gga", 6, (9, 10, 11, 12, 13, 14), ((6, "0"), (7, "00"), (8, "99.99")), 13, hdop=8),
     Layout("RMC", 1, 3, 5, "mode", 12, (7, 8, 10, 11), ((2, "V"), (12, "N")), 9, status=2),
-    Layout("GNS", 1, 2, 4, "modes", 6, (9, 10, 11, 12), ((7, "00"), (8, "99.99")), 11, hdop=8),
+    Layout("GNS", 1, 2, 4, "modes", 6, (9, 10, 11, 12), ((7, "00"), (8, "99.99")), 10, hdop=8),
     Layout("GLL", 5, 1, 3, "mode", 7, (), ((6, "V"), (7, "N")), 5, status=6),
     Layout("PTNL,GGK", 1, 3, 5, "ggk", 7, (9, 10), ((7, "0"), (8, "00")), 10, hdop=9),
     Layout(
@@ -85,7 +88,7 @@ LAYOUTS = (
         quality=10,
         emptied=(4, 7, 8, 14, 15, 16, 17, 18, 19),
         lost=((10, "0"),),
-        fewest=16,
+        fewest=11,
         in_degrees=True,
         from_base=(14, 15),
     ),

@@ -88,9 +88,14 @@ def best_kind(dated: Dated, source: str, notices: list[Notice]) -> Positions | N
     return best
 
 
+def stated_quality(fixes: Sentences, kind: Kind) -> Ints:
+    """The GGA quality (n,) that sentences of one of the POSITION_KINDS state; 0 no fix, -1 not stated."""
+    return _QUALITIES[kind](fixes)
+
+
 def _usable(sentences: Sentences, kind: Kind, rows: Ints, source: str, notices: list[Notice]) -> Positions:
     fixes = sentences.take(rows)
-    quality = _QUALITIES[kind](fixes)
+    quality = stated_quality(fixes, kind)
     if kind == Kind.KSXT:
         lat_deg, lon_deg, garbled = _plain_position(fixes)
     else:
