@@ -113,7 +113,7 @@ def epochs_of_untimed(dated: Dated, rows: Ints) -> Floats:
 def _time_of_day(sentences: Sentences) -> Floats:
     """(n) seconds since midnight, NaN where no time is stated or the field is none."""
     tod_s = np.full(sentences.start.size, np.nan)
-    rows = np.flatnonzero(~kinds_in(sentences.kind, UNTIMED))
+    rows = np.flatnonzero(~kinds_in(sentences.kind, (Kind.OTHER, *UNTIMED)))
     stated = sentences.take(rows).decimals(1)
     whole = np.where(stated.good & (stated.places <= _MOST_PLACES), stated.mantissa, -1)
     places = np.minimum(stated.places, _MOST_PLACES)

@@ -18,11 +18,13 @@ from mcap_ros2.decoder import DecoderFactory
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.single import calibrate_run
 from sccal.cli import main
+from sccal.convert.from_folder import nmea_lines
 from sccal.convert.paths import convert_paths
 from sccal.errors import SccalError
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
+from tests.degrade.logs import NOON, gga, rmc, sentence
 from tests.message_logs import messages_of, write_db3, write_ros1
 from tests.runs import written
 
@@ -223,6 +225,18 @@ def test_sentences_without_receive_times_get_none(simulated: Path, tmp_path: Pat
         shown = [(one.log_time, m) for _, _, one, m in reader.iter_decoded_messages(topics=["/nmea_sentence"])]
     assert all(m.header.stamp.sec == m.header.stamp.nanosec == 0 for _, m in shown)
     assert abs(shown[0][0] * 1e-9 - before.wheels.t_s[0]) < 5
+
+
+def test_what_other_sentences_count_is_no_time_of_day() -> None:
+    """The first field of GSV is a number of messages; in the evening, 3 s after midnight would be the next day."""
+    start_s = 1717243200.0 + 6 * 3600.0
+    lines = []
+    for second in range(40):
+        lines += [gga(NOON + 6 * 3600.0 + second, 52.1, 5.3), rmc(NOON + 6 * 3600.0 + second, 52.1, 5.3)]
+        lines += [sentence("GPGSV,3,1,11,01,45,100,40")]
+    raw = ("\n".join(lines) + "\n").encode()
+    found = nmea_lines(raw, start_s + np.arange(40.0), Path("gnss.nmea"), [])
+    np.testing.assert_allclose(found.shown_s, start_s + np.repeat(np.arange(40.0), 3), atol=1e-6)
 
 
 def test_what_repair_and_notices_need_is_kept(tmp_path: Path) -> None:
