@@ -14,9 +14,9 @@ from sccal.errors import DataError
 from sccal.logs.ahrs import ahrs_table
 from sccal.logs.encoder import encoder_table
 from sccal.logs.gnss_csv import gnss_table
-from sccal.logs.nmea_times import date_sentences
+from sccal.logs.nmea.sentences import find_sentences
+from sccal.logs.nmea.times import date_sentences
 from sccal.logs.run import RunSource, read_run, vehicle_of
-from sccal.logs.sentences import find_sentences
 from sccal.logs.streams import Notice
 from sccal.logs.table import Table
 

@@ -22,8 +22,8 @@ from sccal.degrade.layouts import (
     Layout,
     layout_of,
 )
-from sccal.logs.nmea_positions import stated_quality
-from sccal.logs.sentences import Kind, Sentences
+from sccal.logs.nmea.positions import stated_quality
+from sccal.logs.nmea.sentences import Kind, Sentences
 
 _DAY_S = 86400.0
 _KEYS_PER_S = 1000

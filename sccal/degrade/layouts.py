@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from sccal.arrays import Bools, Ints
 from sccal.degrade.quality import MODE_LETTERS
-from sccal.logs.nmea_positions import KIND_NAMES, POSITION_KINDS
-from sccal.logs.sentences import Kind, Sentences
+from sccal.logs.nmea.positions import KIND_NAMES, POSITION_KINDS
+from sccal.logs.nmea.sentences import Kind, Sentences
 
 Claim = Literal["gga", "mode", "modes", "ggk", "ksxt", "pashr", "pubx"]
 

@@ -19,7 +19,7 @@ from sccal.degrade.faults import FaultedFixes, Faults, fault_fixes, filled_times
 from sccal.degrade.layouts import NOT_A_POSITION, find_layouts, formatters
 from sccal.degrade.rewriting import Plan, kind_name, rewritten_piece
 from sccal.errors import DataError
-from sccal.logs.sentences import Sentences, find_sentences
+from sccal.logs.nmea.sentences import Sentences, find_sentences
 
 _PIECE_BYTES = 1 << 20
 _THREADS = 2

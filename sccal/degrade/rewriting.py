@@ -21,7 +21,7 @@ from sccal.degrade.faults import FaultedFixes, Faults
 from sccal.degrade.layouts import CLAIMS, SECOND_ANTENNA, Layout, layout_of
 from sccal.degrade.places import moved
 from sccal.degrade.quality import written_hdop
-from sccal.logs.sentences import Kind, Sentences
+from sccal.logs.nmea.sentences import Kind, Sentences
 
 _MOST_PLACES = {False: 11, True: 13}
 """Places up to which a float holds minutes and degrees; further ones are written as zeros."""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from sccal.errors import DataError
 from sccal.logs.nmea import read_nmea
-from sccal.logs.sentences import parse_decimals
+from sccal.logs.nmea.sentences import parse_decimals
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.write import checksum, gga, gst, rmc, zda
 

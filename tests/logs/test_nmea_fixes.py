@@ -10,7 +10,7 @@ import pytest
 
 from sccal.errors import DataError
 from sccal.logs.nmea import parse_nmea
-from sccal.logs.sentences import Kind, find_sentences
+from sccal.logs.nmea.sentences import Kind, find_sentences
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.write import gga, gst, rmc, zda
 from tests.receiver import ggk, gns, ksxt, sentence, vtg

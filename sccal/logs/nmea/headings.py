@@ -28,9 +28,9 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import SIGMA_LIMIT_RAD
-from sccal.logs.nmea_positions import KIND_NAMES
-from sccal.logs.nmea_times import UNTIMED, Dated, epoch_key, epochs_of_untimed
-from sccal.logs.sentences import Kind, Sentences, talker_name
+from sccal.logs.nmea.positions import KIND_NAMES
+from sccal.logs.nmea.sentences import Kind, Sentences, talker_name
+from sccal.logs.nmea.times import UNTIMED, Dated, epoch_key, epochs_of_untimed
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Bools, Floats
-from sccal.logs.nmea_positions import KIND_NAMES, Positions
-from sccal.logs.nmea_times import Dated, epoch_key
-from sccal.logs.sentences import talker_name
+from sccal.logs.nmea.positions import KIND_NAMES, Positions
+from sccal.logs.nmea.sentences import talker_name
+from sccal.logs.nmea.times import Dated, epoch_key
 from sccal.logs.streams import Notice
 
 _BEST_FIRST = (4, 5, 2, 9, 3, 1, -1, 8, 6, 7)

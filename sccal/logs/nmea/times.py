@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.logs.sentences import Kind, Sentences, kinds_in
+from sccal.logs.nmea.sentences import Kind, Sentences, kinds_in
 from sccal.logs.streams import Notice
 
 DAY_S = 86400.0

@@ -9,10 +9,10 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M, SPEED_LIMIT_MPS
-from sccal.logs.nmea_positions import altitude, best_kind, extras
-from sccal.logs.nmea_receivers import one_receiver
-from sccal.logs.nmea_times import Dated, epoch_key, epochs_of_untimed
-from sccal.logs.sentences import Kind, Sentences
+from sccal.logs.nmea.positions import altitude, best_kind, extras
+from sccal.logs.nmea.receivers import one_receiver
+from sccal.logs.nmea.sentences import Kind, Sentences
+from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.timeline import order_in_time
 

@@ -20,8 +20,8 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import Bytes, parse_decimals
-from sccal.logs.nmea_times import Dated
-from sccal.logs.sentences import Kind, Sentences
+from sccal.logs.nmea.sentences import Kind, Sentences
+from sccal.logs.nmea.times import Dated
 from sccal.logs.streams import Notice
 
 POSITION_KINDS = (Kind.GGA, Kind.GNS, Kind.GGK, Kind.KSXT, Kind.RMC)

@@ -1,8 +1,6 @@
-"""``gnss.nmea``: what receivers write, as fixes and, where there is no ahrs.csv, as headings.
+"""``gnss.nmea``, from a file or from bytes, as fixes or as headings.
 
-Only sentences whose checksum is right are used, or which have none and are otherwise whole. Times and dates are found
-in ``nmea_times``, fixes in ``nmea_fixes`` (from ``nmea_positions`` and ``nmea_receivers``), headings in
-``nmea_headings``.
+Only sentences whose checksum is right are used, or which have none and are otherwise whole.
 """
 
 from __future__ import annotations
@@ -14,10 +12,10 @@ import numpy as np
 from sccal.arrays import Bools
 from sccal.errors import DataError
 from sccal.logs.decimals import words_of
-from sccal.logs.nmea_fixes import read_fixes
-from sccal.logs.nmea_headings import HEADING_NAMES, read_heading
-from sccal.logs.nmea_times import Dated, date_sentences
-from sccal.logs.sentences import Kind, Sentences, all_lower, find_sentences
+from sccal.logs.nmea.fixes import read_fixes
+from sccal.logs.nmea.headings import HEADING_NAMES, read_heading
+from sccal.logs.nmea.sentences import Kind, Sentences, all_lower, find_sentences
+from sccal.logs.nmea.times import Dated, date_sentences
 from sccal.logs.streams import FixStream, HeadingStream, Notice
 
 _FIELDS_NEEDED = {
