@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.degrade.decimals import Decimals, read_decimals
 from sccal.degrade.layouts import (
     LAYOUTS,
     NOT_A_POSITION,
@@ -22,6 +21,7 @@ from sccal.degrade.layouts import (
     Layout,
     layout_of,
 )
+from sccal.logs.decimals import Digits, read_digits
 from sccal.logs.nmea.positions import stated_quality
 from sccal.logs.nmea.sentences import Kind, Sentences
 
@@ -212,8 +212,8 @@ def _midnight(time_of_day: Floats, stated: Floats, start_s: float) -> float:
     return float(values[counts.argmax()]) * _DAY_S
 
 
-def _field(part: Sentences, field: int) -> Decimals:
-    return read_decimals(part.data, *part.span(field))
+def _field(part: Sentences, field: int) -> Digits:
+    return read_digits(part.data, *part.span(field))
 
 
 def _angle(part: Sentences, layout: Layout, field: int, sides: bytes, limit_deg: float) -> tuple[Floats, Ints]:

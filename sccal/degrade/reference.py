@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.degrade.decimals import write_decimals
 from sccal.degrade.edits import Bytes
+from sccal.logs.decimals import write_decimals
 from sccal.logs.reference import STATES, ReferenceRows
 
 _DEGREE_PLACES, _TIME_PLACES = 13, 6

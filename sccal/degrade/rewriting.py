@@ -14,13 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.degrade.decimals import read_decimals, write_decimals
 from sccal.degrade.edits import Bytes, Edits, constant
 from sccal.degrade.epochs import CRC_DIGITS, Epochs, Holders, crc_32, span, time_of_day_s
 from sccal.degrade.faults import FaultedFixes, Faults
 from sccal.degrade.layouts import CLAIMS, SECOND_ANTENNA, Layout, layout_of
 from sccal.degrade.places import moved
 from sccal.degrade.quality import written_hdop
+from sccal.logs.decimals import read_digits, write_decimals
 from sccal.logs.nmea.sentences import Kind, Sentences
 
 _MOST_PLACES = {False: 11, True: 13}
@@ -202,7 +202,7 @@ def _put_values(piece: _Piece, rows: Ints, field: int, new: Callable[[Floats, Bo
     ``new`` is given the old values (m,) and which of ``rows`` (k,) they are of.
     """
     begin, end = piece.span(rows, field)
-    old = read_decimals(piece.found.data, begin, end)
+    old = read_digits(piece.found.data, begin, end)
     good = old.good & (old.places <= _MOST_PLACES[True])
     values = new(old.values[good], good)
     mantissa = np.round(np.minimum(np.abs(values) * 10.0 ** old.places[good], _LARGEST)).astype(np.int64)

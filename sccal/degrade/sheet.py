@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.degrade.decimals import Decimals, read_decimals, write_decimals
 from sccal.degrade.edits import Bytes, Edits
 from sccal.errors import DataError
+from sccal.logs.decimals import PAD, Digits, read_digits, write_decimals
 
-_PAD = 64
 _MOST_PLACES = 13
 _LARGEST = 9e17
 _WRAPPING = np.zeros(256, dtype=np.bool_)
@@ -29,7 +28,7 @@ class Cells:
 
     begin: Ints
     end: Ints
-    decimals: Decimals
+    decimals: Digits
     values: Floats
     """NaN where the cell holds no finite number."""
 
@@ -39,7 +38,7 @@ class Sheet:
 
     def __init__(self, raw: bytes, name: str) -> None:
         """Find the header and the lines below it. Raises DataError where there is no header."""
-        self.data: Bytes = np.frombuffer(raw + bytes(_PAD), dtype=np.uint8)
+        self.data: Bytes = np.frombuffer(raw + bytes(PAD), dtype=np.uint8)
         self.edits = Edits(self.data, len(raw))
         self._mark = b"\n" if b"\n" in raw else b"\r"
         first = 3 if raw.startswith(b"\xef\xbb\xbf") else 0
@@ -87,8 +86,8 @@ class Sheet:
         begin = np.minimum(begin, line_stop)
         end = np.minimum(self._separators[np.minimum(before + 1, last)], line_stop)
         begin, end = self._bare(begin, np.maximum(begin, end))
-        decimals = read_decimals(self.data, begin, end)
-        values = decimals.values
+        decimals = read_digits(self.data, begin, end)
+        values = decimals.values.copy()
         for row in np.flatnonzero(~decimals.good & (end > begin) & ~self.comment).tolist():
             values[row] = _number(self.data[begin[row] : end[row]].tobytes())
         values[self.comment] = np.nan

@@ -1,4 +1,6 @@
-"""Plain decimals ``[-+]digits[.digits]`` in a byte buffer, many at a time, rounded as a decimal parser rounds.
+"""Plain decimals ``[-+]digits[.digits]`` in a byte buffer, many at a time: read and written with the digits they have.
+
+Numbers are rounded as a decimal parser rounds them.
 
 A column of a log has few layouts: so many digits before the point, so many after. All numbers of one layout are read
 eight digits at a time: eight bytes as one word, whose digits are joined pairwise by three multiplications (the SWAR
@@ -30,7 +32,7 @@ _CARRY = np.uint64(0x7676767676767676)
 _EVEN = np.uint64(0x000000FF000000FF)
 _HUNDREDS = np.uint64(0x000F424000000064)
 _UNITS = np.uint64(0x0000271000000001)
-_POINT = ord(".")
+_POINT, _ZERO, _MINUS = ord("."), ord("0"), ord("-")
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,23 @@ class Decimals:
     """False where there is no plain decimal; mantissa and places then mean nothing."""
     exact: Floats
     """The nearest float; NaN where not good."""
+
+
+@dataclass(frozen=True)
+class Digits:
+    """Numbers with the digits that they were written with; every array (n,)."""
+
+    good: Bools
+    """False for what is not a plain decimal of at most 18 digits; the other arrays are 0 there, ``values`` NaN."""
+    mantissa: Ints
+    """Without sign."""
+    negative: Bools
+    whole: Ints
+    """Digits before the point."""
+    places: Ints
+    """Digits after the point."""
+    dotted: Bools
+    values: Floats
 
 
 def words_of(data: Bytes) -> Words:
@@ -111,6 +130,60 @@ def read_decimals(data: Bytes, begin: Ints, end: Ints) -> Decimals:
         magnitude = float(data[begin[row] : begin[row] + length[row]].tobytes())
         exact[row] = -magnitude if negative[row] else magnitude
     return Decimals(mantissa, places, good, exact)
+
+
+def read_digits(data: Bytes, begin: Ints, end: Ints) -> Digits:
+    """As ``read_decimals``, with what it takes to write another number in the same form."""
+    read = read_decimals(data, begin, end)
+    length = np.where(read.good, end - begin, 0)
+    first = data[np.minimum(begin, data.size - 1)]
+    negative = (first == _MINUS) & (length > 0)
+    signed = negative | ((first == ord("+")) & (length > 0))
+    dotted = (length > 0) & ((read.places > 0) | (data[np.maximum(end - 1, 0)] == _POINT))
+    whole = length - signed - dotted - read.places
+    good = read.good & (whole + read.places <= _MOST_DIGITS)
+    mantissa, whole, places = (np.where(good, one, 0) for one in (np.abs(read.mantissa), whole, read.places))
+    values = read.exact if good.all() else np.where(good, read.exact, np.nan)
+    return Digits(good, mantissa, negative & good, whole, places, dotted & good, values)
+
+
+def write_decimals(mantissa: Ints, negative: Bools, whole: Ints, places: Ints, dotted: Bools) -> Bytes:
+    """Texts (n, width) with at least ``whole`` digits before the dot and ``places`` after it.
+
+    A dot is written where there are places, or where ``dotted`` is True. Zero gets no minus.
+    """
+    n = mantissa.size
+    power = 10 ** np.arange(_MOST_DIGITS + 1, dtype=np.int64)
+    digits = np.maximum(np.searchsorted(power, mantissa, side="right"), 1)
+    before = np.maximum(np.maximum(whole, digits - places), 1 * (places == 0))
+    minus = negative & (mantissa > 0)
+    dot = dotted | (places > 0)
+    shape = ((before * 32 + places) * 2 + dot) * 2 + minus
+    width = int((before + places + dot + minus).max(initial=0))
+    text = np.zeros((n, width), dtype=np.uint8)
+    shapes = [int(shape[0])] if n and (shape == shape[0]).all() else np.unique(shape).tolist()
+    for one in shapes:
+        rows = slice(None) if len(shapes) == 1 else np.flatnonzero(shape == one)
+        rest = mantissa[rows].copy()
+        sign, has_dot, after = one & 1, one >> 1 & 1, one >> 2 & 31
+        column = sign + (one >> 7) + has_dot + after
+        for _ in range(after):
+            column -= 1
+            text[rows, column], rest = _last_digit(rest)
+        if has_dot:
+            column -= 1
+            text[rows, column] = _POINT
+        for _ in range(one >> 7):
+            column -= 1
+            text[rows, column], rest = _last_digit(rest)
+        if sign:
+            text[rows, 0] = _MINUS
+    return text
+
+
+def _last_digit(rest: Ints) -> tuple[Bytes, Ints]:
+    shorter = rest // 10
+    return (rest - shorter * 10 + _ZERO).astype(np.uint8), shorter
 
 
 def _digits(words: Words, at: Ints, count: int, start: Ints | None) -> tuple[Ints, Bools]:
