@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sccal.arrays import Floats, Ints
+from sccal.arrays import Floats
 from sccal.degrade.epochs import Epochs, Holders, find_holders, gathered, zda_days
 from sccal.degrade.faults import FaultedFixes, Faults, fault_fixes, filled_times, on_the_day
-from sccal.degrade.layouts import NOT_A_POSITION, find_layouts, formatters
-from sccal.degrade.rewriting import Plan, kind_name, rewritten_piece
+from sccal.degrade.rewriting import Plan, rewritten_piece
 from sccal.errors import DataError
-from sccal.logs.nmea.sentences import Sentences, find_sentences
+from sccal.logs.nmea.kinds import LAYOUTS, PLACED, Kind
+from sccal.logs.nmea.sentences import Sentences, find_sentences, formatters, kinds_in
 
 _PIECE_BYTES = 1 << 20
 _THREADS = 2
@@ -90,8 +90,7 @@ def degrade_nmea(raw: bytes, faults: Faults, span_s: tuple[float, float] | None,
 
 def _collected(piece: bytes) -> tuple[Holders, tuple[Floats, Floats], Counter[str]]:
     found = find_sentences(piece)
-    codes = find_layouts(found)
-    return find_holders(found, codes), zda_days(found), _kinds(found, codes)
+    return find_holders(found), zda_days(found), _kinds(found)
 
 
 def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:
@@ -104,16 +103,17 @@ def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:
         first = last
 
 
-def _kinds(found: Sentences, codes: Ints) -> Counter[str]:
+def _kinds(found: Sentences) -> Counter[str]:
     """How many sentences of each kind there are; those with a wrong checksum apart."""
     wrong = found.has_checksum & ~found.right_checksum
     counts: Counter[str] = Counter()
-    for code in np.unique(codes[~wrong]).tolist():
-        if code != NOT_A_POSITION:
-            counts[kind_name(code)] += int(np.count_nonzero((codes == code) & ~wrong))
-    kinds, numbers = np.unique(formatters(found)[(codes == NOT_A_POSITION) & ~wrong], return_counts=True)
+    placed = kinds_in(found.kind, PLACED)
+    kinds, numbers = np.unique(found.kind[placed & ~wrong], return_counts=True)
     for kind, number in zip(kinds.tolist(), numbers.tolist(), strict=True):
-        counts[kind.decode("ascii") or "other"] += number
+        counts[LAYOUTS[Kind(kind)].name] += number
+    names, numbers = np.unique(formatters(found)[~placed & ~wrong], return_counts=True)
+    for name, number in zip(names.tolist(), numbers.tolist(), strict=True):
+        counts[name.decode("ascii") or "other"] += number
     if wrong.any():
         counts["wrong checksum"] += int(wrong.sum())
     return counts

@@ -17,8 +17,6 @@ NOMINAL_SIGMA_M = {1: 3.0, 2: 1.0, 3: 1.5, 4: 0.015, 5: 0.35, 8: 0.015, 9: 1.0}
 _UP_TO_M = ((0.03, 4), (0.6, 5), (1.75, 2))
 """Qualities by the largest σ (m) for which they are written; 1 beyond."""
 _OF_NO_MEANING_M = 3.0
-MODE_LETTERS = {0: "N", 1: "A", 2: "D", 3: "P", 4: "R", 5: "F", 6: "E", 7: "M", 8: "S", 9: "D"}
-"""Mode indicators of RMC, GNS and GLL by GGA quality."""
 MOST_HDOP = 99.99
 
 

@@ -15,20 +15,21 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.degrade.edits import Bytes, Edits, constant
-from sccal.degrade.epochs import CRC_DIGITS, Epochs, Holders, crc_32, span, time_of_day_s
+from sccal.degrade.epochs import Epochs, Holders
 from sccal.degrade.faults import FaultedFixes, Faults
-from sccal.degrade.layouts import CLAIMS, SECOND_ANTENNA, Layout, layout_of
 from sccal.degrade.places import moved
 from sccal.degrade.quality import written_hdop
 from sccal.logs.decimals import read_digits, write_decimals
-from sccal.logs.nmea.sentences import Kind, Sentences
+from sccal.logs.nmea.kinds import GST_SIGMAS, LAYOUTS, Kind, Position
+from sccal.logs.nmea.positions import position_of
+from sccal.logs.nmea.sentences import LONG_CHECKSUM_DIGITS, Sentences, crc_32
+from sccal.logs.nmea.times import times_of_day
 
 _MOST_PLACES = {False: 11, True: 13}
 """Places up to which a float holds minutes and degrees; further ones are written as zeros."""
 _FAR_DEG = 0.01
 _LARGEST = 9e17
 """What the digits of a field can hold."""
-_GST_SIGMAS = (3, 4, 6, 7)
 _UPPER = np.frombuffer(b"0123456789ABCDEF", dtype=np.uint8)
 _LOWER = np.frombuffer(b"0123456789abcdef", dtype=np.uint8)
 
@@ -55,10 +56,6 @@ class _Piece:
         self.touched = np.zeros(found.start.size, dtype=np.bool_)
         self.size = size
 
-    def span(self, rows: Ints, field: int) -> tuple[Ints, Ints]:
-        """Where a field of the sentences ``rows`` (k,) begins and ends; empty where they do not have it."""
-        return span(self.found, rows, field)
-
     def has(self, rows: Ints, field: int) -> Bools:
         """Which sentences have that field, empty or not."""
         there: Bools = self.found.fields[rows] >= field
@@ -72,7 +69,7 @@ class _Piece:
     def put_field(self, rows: Ints, field: int, text: bytes) -> None:
         """The same text for a field of each of the sentences ``rows`` that has it with another text."""
         rows = rows[self.has(rows, field)]
-        begin, end = self.span(rows, field)
+        begin, end = self.found.span(field, rows)
         other = end - begin != len(text)
         for place, mark in enumerate(text):
             other |= self.found.data[np.minimum(begin + place, self.found.data.size - 1)] != mark
@@ -88,17 +85,17 @@ def rewritten_piece(
     """
     piece = _Piece(found, size, plan)
     dropped: list[Ints] = []
-    for code in np.unique(holders.code).tolist():
-        rows = np.flatnonzero((holders.code == code) & (epoch_of >= 0))
-        layout = layout_of(code)
-        lost = plan.fixes.lost[epoch_of[rows]] & _filled(piece, holders.row[rows], layout)
+    for kind in np.unique(holders.kind).tolist():
+        rows = np.flatnonzero((holders.kind == kind) & (epoch_of >= 0))
+        fields = position_of(Kind(kind))
+        lost = plan.fixes.lost[epoch_of[rows]] & _filled(piece, holders.row[rows], fields)
         if plan.faults.drop:
             dropped.append(rows[lost])
         else:
-            _lose(piece, holders.row[rows[lost]], layout)
+            _lose(piece, holders.row[rows[lost]], fields)
         alive = rows[~plan.fixes.lost[epoch_of[rows]]]
-        _move(piece, holders, alive, epoch_of[alive], layout)
-        _claim(piece, holders.row[alive], holders.quality[alive], epoch_of[alive], layout)
+        _move(piece, holders, alive, epoch_of[alive], fields)
+        _claim(piece, holders.row[alive], holders.quality[alive], epoch_of[alive], fields)
     if plan.faults.gst and plan.faults.noise_m:
         _widen_gst(piece)
     _close(piece, holders)
@@ -113,57 +110,54 @@ def rewritten_piece(
 
 
 def _counts(holders: Holders, chosen: Bools) -> Counter[str]:
-    codes, counts = np.unique(holders.code[chosen], return_counts=True)
-    return Counter({kind_name(code): int(count) for code, count in zip(codes.tolist(), counts.tolist(), strict=True)})
+    kinds, counts = np.unique(holders.kind[chosen], return_counts=True)
+    return Counter(
+        {LAYOUTS[Kind(kind)].name: int(count) for kind, count in zip(kinds.tolist(), counts.tolist(), strict=True)}
+    )
 
 
-def kind_name(code: int) -> str:
-    """GGA, or GGAH for that of the second antenna."""
-    return layout_of(code).name + ("H" if code >= SECOND_ANTENNA else "")
-
-
-def _filled(piece: _Piece, rows: Ints, layout: Layout) -> Bools:
+def _filled(piece: _Piece, rows: Ints, fields: Position) -> Bools:
     """Which sentences have anything where the position stands."""
     filled = np.zeros(rows.size, dtype=np.bool_)
-    for field in (layout.latitude, layout.longitude):
-        begin, end = piece.span(rows, field)
+    for field in (fields.latitude, fields.longitude):
+        begin, end = piece.found.span(field, rows)
         filled |= end > begin
     return filled
 
 
-def _lose(piece: _Piece, rows: Ints, layout: Layout) -> None:
-    sides = () if layout.in_degrees else (layout.latitude + 1, layout.longitude + 1)
-    for field in (layout.latitude, layout.longitude, *sides, *layout.emptied):
+def _lose(piece: _Piece, rows: Ints, fields: Position) -> None:
+    sides = () if fields.in_degrees else (fields.latitude + 1, fields.longitude + 1)
+    for field in (fields.latitude, fields.longitude, *sides, *fields.emptied):
         piece.put_field(rows, field, b"")
-    for field, text in layout.lost:
+    for field, text in fields.lost:
         piece.put_field(rows, field, text.encode())
-    if layout.claim == "modes":
-        _put_modes(piece, rows, np.full(rows.size, ord("N"), dtype=np.uint8), over_none=True)
+    if fields.claim.form == "letters":
+        _put_modes(piece, rows, fields.quality, np.full(rows.size, ord("N"), dtype=np.uint8), over_none=True)
 
 
-def _move(piece: _Piece, holders: Holders, at: Ints, epoch: Ints, layout: Layout) -> None:
+def _move(piece: _Piece, holders: Holders, at: Ints, epoch: Ints, fields: Position) -> None:
     fixes, epochs = piece.plan.fixes, piece.plan.epochs
     going = fixes.displaced[epoch] & np.isfinite(holders.lat_deg[at])
     at, epoch = at[going], epoch[going]
     rows = holders.row[at]
     old_lat, old_lon = holders.lat_deg[at], holders.lon_deg[at]
     lat_step, lon_step = old_lat - epochs.lat_deg[epoch], _turned(old_lon - epochs.lon_deg[epoch])
-    lat = _as_epoch(lat_step, holders.lat_digits[at], layout) + fixes.lat_deg[epoch]
-    lon = _turned(_as_epoch(lon_step, holders.lon_digits[at], layout) + fixes.lon_deg[epoch])
+    lat = _as_epoch(lat_step, holders.lat_digits[at], fields) + fixes.lat_deg[epoch]
+    lon = _turned(_as_epoch(lon_step, holders.lon_digits[at], fields) + fixes.lon_deg[epoch])
     far = (np.abs(lat_step) > _FAR_DEG) | (np.abs(lon_step) > _FAR_DEG) | (np.abs(lat) > 90)
     if far.any():
         lat[far], lon[far] = moved(old_lat[far], old_lon[far], fixes.east_m[epoch[far]], fixes.north_m[epoch[far]])
-    _put_angle(piece, rows, layout, layout.latitude, lat, holders.lat_digits[at], b"NS")
-    _put_angle(piece, rows, layout, layout.longitude, lon, holders.lon_digits[at], b"EW")
-    if layout.from_base is not None:
-        east, north = layout.from_base
+    _put_angle(piece, rows, fields, fields.latitude, lat, holders.lat_digits[at], b"NS")
+    _put_angle(piece, rows, fields, fields.longitude, lon, holders.lon_digits[at], b"EW")
+    if fields.from_base_m is not None:
+        east, north = fields.from_base_m
         _put_values(piece, rows, east, lambda east_m, good: east_m + fixes.east_m[epoch[good]])
         _put_values(piece, rows, north, lambda north_m, good: north_m + fixes.north_m[epoch[good]])
 
 
-def _as_epoch(step_deg: Floats, digits: Ints, layout: Layout) -> Floats:
+def _as_epoch(step_deg: Floats, digits: Ints, fields: Position) -> Floats:
     """Steps from the epoch's position, 0 where they are only the rounding of a field with fewer digits."""
-    unit_deg = 10.0 ** -(np.abs(digits) % 100) / (1.0 if layout.in_degrees else 60.0)
+    unit_deg = 10.0 ** -(np.abs(digits) % 100) / (1.0 if fields.in_degrees else 60.0)
     return np.where(np.abs(step_deg) <= 1.001 * unit_deg, 0.0, step_deg)
 
 
@@ -172,24 +166,24 @@ def _turned(lon_deg: Floats) -> Floats:
 
 
 def _put_angle(
-    piece: _Piece, rows: Ints, layout: Layout, field: int, angle_deg: Floats, digits: Ints, sides: bytes
+    piece: _Piece, rows: Ints, fields: Position, field: int, angle_deg: Floats, digits: Ints, sides: bytes
 ) -> None:
     """Write angles with the digits that their fields have, and the hemisphere after them."""
     places = np.abs(digits) % 100
-    exact = np.minimum(places, _MOST_PLACES[layout.in_degrees])
+    exact = np.minimum(places, _MOST_PLACES[fields.in_degrees])
     unit = 10**exact
-    if layout.in_degrees:
+    if fields.in_degrees:
         mantissa = np.round(np.abs(angle_deg) * unit).astype(np.int64)
     else:
         units = np.round(np.abs(angle_deg) * 60 * unit).astype(np.int64)
         mantissa = units // (60 * unit) * (100 * unit) + units % (60 * unit)
     mantissa *= 10 ** (places - exact)
-    minus = (angle_deg < 0) & layout.in_degrees
-    begin, end = piece.span(rows, field)
+    minus = (angle_deg < 0) & fields.in_degrees
+    begin, end = piece.found.span(field, rows)
     piece.put(rows, begin, end, write_decimals(mantissa, minus, np.abs(digits) // 100, places, digits > 0))
-    if layout.in_degrees:
+    if fields.in_degrees:
         return
-    begin, _ = piece.span(rows, field + 1)
+    begin, _ = piece.found.span(field + 1, rows)
     old = piece.found.data[begin] & 0xDF
     new = np.where(angle_deg < 0, sides[1], sides[0]).astype(np.uint8)
     turned = np.flatnonzero((old != new) & (mantissa > 0))
@@ -201,7 +195,7 @@ def _put_values(piece: _Piece, rows: Ints, field: int, new: Callable[[Floats, Bo
 
     ``new`` is given the old values (m,) and which of ``rows`` (k,) they are of.
     """
-    begin, end = piece.span(rows, field)
+    begin, end = piece.found.span(field, rows)
     old = read_digits(piece.found.data, begin, end)
     good = old.good & (old.places <= _MOST_PLACES[True])
     values = new(old.values[good], good)
@@ -211,7 +205,7 @@ def _put_values(piece: _Piece, rows: Ints, field: int, new: Callable[[Floats, Bo
     piece.put(rows[good], begin[good], end[good], text)
 
 
-def _claim(piece: _Piece, rows: Ints, own_quality: Ints, epoch: Ints, layout: Layout) -> None:
+def _claim(piece: _Piece, rows: Ints, own_quality: Ints, epoch: Ints, fields: Position) -> None:
     """What the sentences say about how good their fix is."""
     plan = piece.plan
     noisy = plan.fixes.noisy[epoch] & (own_quality != 0)
@@ -219,26 +213,26 @@ def _claim(piece: _Piece, rows: Ints, own_quality: Ints, epoch: Ints, layout: La
     old, new = plan.epochs.quality[epoch], plan.fixes.quality[epoch]
     for quality in np.unique(new[(new != old) & (old > 0)]).tolist():
         with_it = (new == quality) & (new != old) & (old > 0)
-        text = CLAIMS[layout.claim][quality]
+        text = fields.claim.written[quality]
         stated = rows[with_it & (own_quality > 0)]
-        if layout.claim == "modes":
-            _put_modes(piece, stated, np.full(stated.size, ord(text), dtype=np.uint8), over_none=False)
+        if fields.claim.form == "letters":
+            _put_modes(piece, stated, fields.quality, np.full(stated.size, ord(text), dtype=np.uint8), over_none=False)
         else:
-            piece.put_field(stated, layout.quality, text.encode())
-        if quality == 0 and layout.status is not None:
-            piece.put_field(rows[with_it], layout.status, b"V")
+            piece.put_field(stated, fields.quality, text.encode())
+        if quality == 0 and fields.status is not None:
+            piece.put_field(rows[with_it], fields.status, b"V")
     noise_m = plan.faults.noise_m
     if not noise_m:
         return
-    if layout.hdop is not None:
-        _put_values(piece, rows, layout.hdop, lambda hdop, good: written_hdop(hdop, noise_m, new[good]))
-    if layout.accuracy is not None:
-        _put_values(piece, rows, layout.accuracy, lambda accuracy_m, _: np.hypot(accuracy_m, math.sqrt(2) * noise_m))
+    if fields.hdop is not None:
+        _put_values(piece, rows, fields.hdop, lambda hdop, good: written_hdop(hdop, noise_m, new[good]))
+    if fields.accuracy_m is not None:
+        _put_values(piece, rows, fields.accuracy_m, lambda accuracy_m, _: np.hypot(accuracy_m, math.sqrt(2) * noise_m))
 
 
-def _put_modes(piece: _Piece, rows: Ints, letter: Bytes, over_none: bool) -> None:
+def _put_modes(piece: _Piece, rows: Ints, field: int, letter: Bytes, over_none: bool) -> None:
     """GNS: a letter for each constellation; N, no fix, stays N unless ``over_none``."""
-    begin, end = piece.span(rows, 6)
+    begin, end = piece.found.span(field, rows)
     length = end - begin
     text = np.zeros((rows.size, int(length.max(initial=0))), dtype=np.uint8)
     for place in range(text.shape[1]):
@@ -254,9 +248,9 @@ def _widen_gst(piece: _Piece) -> None:
     found, plan = piece.found, piece.plan
     rows = np.flatnonzero((found.kind == Kind.GST) & (found.right_checksum | (~found.has_checksum & found.complete)))
     part = found.take(rows)
-    epoch = plan.epochs.at(time_of_day_s(part, 1))
+    epoch = plan.epochs.at(times_of_day(part, (Kind.GST,)))
     rows = rows[(epoch >= 0) & plan.fixes.noisy[epoch] & ~plan.fixes.lost[epoch]]
-    for field in _GST_SIGMAS:
+    for field in GST_SIGMAS:
         _put_values(piece, rows, field, lambda sigma_m, _: np.hypot(sigma_m, plan.faults.noise_m))
 
 
@@ -278,9 +272,9 @@ def _close(piece: _Piece, holders: Holders) -> None:
     for row in np.flatnonzero(piece.touched & with_crc).tolist():
         stop = int(found.stop[row])
         crc = f"{crc_32(piece.edits.within(int(found.start[row]) + 1, stop)):08X}"
-        old = data[stop + 1 : stop + 1 + CRC_DIGITS].tobytes()
+        old = data[stop + 1 : stop + 1 + LONG_CHECKSUM_DIGITS].tobytes()
         new = (crc.lower() if old != old.upper() else crc).encode()
-        piece.edits.put(np.array([stop + 1]), np.array([stop + 1 + CRC_DIGITS]), constant(new, 1))
+        piece.edits.put(np.array([stop + 1]), np.array([stop + 1 + LONG_CHECKSUM_DIGITS]), constant(new, 1))
 
 
 def _leave_out(piece: _Piece, rows: Ints, with_crc: Bools) -> None:
@@ -289,7 +283,7 @@ def _leave_out(piece: _Piece, rows: Ints, with_crc: Bools) -> None:
     body = found.data[:size]
     breaks = np.append(np.flatnonzero((body == ord("\n")) | (body == ord("\r"))), size)
     start = found.start[rows]
-    stop = found.stop[rows] + np.where(with_crc, 1 + CRC_DIGITS, np.where(found.has_checksum[rows], 3, 0))
+    stop = found.stop[rows] + np.where(with_crc, 1 + LONG_CHECKSUM_DIGITS, np.where(found.has_checksum[rows], 3, 0))
     line_at = np.searchsorted(breaks, start)
     line_start = np.where(line_at > 0, breaks[line_at - 1] + 1, 0)
     line_stop = breaks[np.searchsorted(breaks, stop)]

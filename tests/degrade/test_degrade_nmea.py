@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import zlib
 
 import numpy as np
 import pynmeagps
@@ -258,6 +259,17 @@ def test_a_long_checksum_of_unicore_is_right_again() -> None:
     again = degraded(changed.raw, Faults(quality=5))
     assert again.rewritten["KSXT"] == 1
     assert ",,2,3," in again.raw.decode()
+
+
+def test_a_long_checksum_that_begins_like_a_short_one_stays_long() -> None:
+    for count in range(10_000):
+        body = f"KSXT,20201222075720.00,119.17084152,32.07387900,83.5770,269.94,1.19,207.28,0.001,,3,3,25,{count},,,,,,"
+        long = f"{zlib.crc32(body.encode(), 0xFFFFFFFF) ^ 0xFFFFFFFF:08X}"
+        if sentence(body).endswith(long[:2]):
+            break
+    done = degraded(f"${body}*{long}\n", Faults(quality=1)).raw.decode()
+    new = body.replace(",,3,3,", ",,1,3,")
+    assert done == f"${new}*{zlib.crc32(new.encode(), 0xFFFFFFFF) ^ 0xFFFFFFFF:08X}\n"
 
 
 def test_small_hex_digits_stay_small() -> None:

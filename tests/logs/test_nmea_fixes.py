@@ -10,7 +10,8 @@ import pytest
 
 from sccal.errors import DataError
 from sccal.logs.nmea import parse_nmea
-from sccal.logs.nmea.sentences import Kind, find_sentences
+from sccal.logs.nmea.kinds import Kind
+from sccal.logs.nmea.sentences import find_sentences
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.write import gga, gst, rmc, zda
 from tests.receiver import ggk, gns, ksxt, sentence, vtg
@@ -279,7 +280,7 @@ def test_ksxt_of_unicore_as_its_manual_prints_it() -> None:
 
 def test_other_sentences_of_ashtech_under_the_same_name_are_no_attitude() -> None:
     lines = [sentence("PASHR,POS,2,10,120000.00"), sentence("PASHR,ATT,1,2,3,4,5,6,0"), sentence("PTNL,VGK,1,2")]
-    assert find_sentences("\n".join(lines).encode()).kind.tolist() == [Kind.OTHER] * 3
+    assert find_sentences("\n".join(lines).encode()).kind.tolist() == [Kind.PASHR_POS, Kind.OTHER, Kind.OTHER]
     _, notices = read([zda(NOON_S), *lines, fix(0), fix(1)])
     assert told(notices, "other sentences").count == 3
 

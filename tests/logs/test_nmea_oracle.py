@@ -12,7 +12,8 @@ from pynmeagps import VALCKSUM, NMEAMessage, NMEAReader
 
 from sccal.logs.decimals import read_decimals
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
-from sccal.logs.nmea.sentences import Kind, find_sentences
+from sccal.logs.nmea.kinds import Kind
+from sccal.logs.nmea.sentences import find_sentences
 from sccal.logs.write import zda
 from tests.receiver import sentence
 

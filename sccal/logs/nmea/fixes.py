@@ -9,9 +9,10 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M, SPEED_LIMIT_MPS
+from sccal.logs.nmea.kinds import GST_BEARING, GST_SIGMAS, LAYOUTS, READ_FOR_SPEEDS, UNTIMED, Kind
 from sccal.logs.nmea.positions import altitude, best_kind, extras
 from sccal.logs.nmea.receivers import one_receiver
-from sccal.logs.nmea.sentences import Kind, Sentences
+from sccal.logs.nmea.sentences import Sentences
 from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.timeline import order_in_time
@@ -65,28 +66,34 @@ def _speeds(dated: Dated, running_s: Floats) -> Floats | None:
     """Speed over ground (m/s) at the epochs ``running_s``, from RMC, else KSXT, else VTG; None where there is none."""
     wanted = epoch_key(running_s)
     speed_mps = np.full(wanted.size, np.nan)
-    for kind in (Kind.RMC, Kind.KSXT, Kind.VTG):
+    for kind in READ_FOR_SPEEDS:
         rows = np.flatnonzero(dated.sentences.kind == kind)
         missing = np.flatnonzero(np.isnan(speed_mps))
         if rows.size == 0 or missing.size == 0:
             continue
-        own = dated.sentences.take(rows)
-        if kind == Kind.RMC:
-            value = np.where(own.letter(2) == ord("A"), own.number(7) * _KNOT_MPS, np.nan)
-        elif kind == Kind.KSXT:
-            value = own.number(8) / 3.6
-        else:
-            knots, kmph = own.number(5), own.number(7)
-            value = np.where(np.isfinite(kmph), kmph / 3.6, knots * _KNOT_MPS)
-            value = np.where(own.letter(9) == ord("N"), np.nan, value)
+        value = _speed_mps(dated.sentences.take(rows), kind)
         usable = np.flatnonzero((value >= 0) & (value <= SPEED_LIMIT_MPS))
         if usable.size == 0:
             continue
         rows, value = rows[usable], value[usable]
-        key = epoch_key(_epochs_by_talker(dated, rows) if kind == Kind.VTG else dated.running_s[rows])
+        key = epoch_key(_epochs_by_talker(dated, rows) if kind in UNTIMED else dated.running_s[rows])
         at, hit = _matched(key, wanted[missing])
         speed_mps[missing[hit]] = value[at[hit]]
     return speed_mps if np.isfinite(speed_mps).any() else None
+
+
+def _speed_mps(own: Sentences, kind: Kind) -> Floats:
+    """Speeds (n,) of sentences of one kind; NaN where they have none, or say that it does not hold."""
+    fields = LAYOUTS[kind].speed
+    assert fields is not None
+    value = np.full(own.start.size, np.nan) if fields.kmph is None else own.number(fields.kmph) / 3.6
+    if fields.knots is not None:
+        value = np.where(np.isfinite(value), value, own.number(fields.knots) * _KNOT_MPS)
+    if fields.told_by is None:
+        return value
+    letter = own.letter(fields.told_by)
+    holds = letter == ord(fields.holds) if fields.holds else letter != ord(fields.holds_not)
+    return np.where(holds, value, np.nan)
 
 
 def _epochs_by_talker(dated: Dated, rows: Ints) -> Floats:
@@ -117,8 +124,8 @@ def _stated_sigmas(dated: Dated, fix_running_s: Floats, talker: int) -> tuple[Fl
         rows = rows[np.argsort(other, kind="stable")]
     gst = dated.sentences.take(rows)
     at, hit = _matched(epoch_key(dated.running_s[rows]), epoch_key(fix_running_s))
-    gst_north, gst_east = gst.number(6), gst.number(7)
-    major, minor, bearing = gst.number(3), gst.number(4), np.radians(gst.number(5))
+    major, minor, gst_north, gst_east = (gst.number(field) for field in GST_SIGMAS)
+    bearing = np.radians(gst.number(GST_BEARING))
     var_north = (major * np.cos(bearing)) ** 2 + (minor * np.sin(bearing)) ** 2
     var_east = (major * np.sin(bearing)) ** 2 + (minor * np.cos(bearing)) ** 2
     ellipse_cov = (major**2 - minor**2) * np.sin(bearing) * np.cos(bearing)

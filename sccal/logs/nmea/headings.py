@@ -1,19 +1,15 @@
 """Headings out of NMEA sentences, for logs whose heading comes from two antennas or from a receiver with gyros.
 
-All are clockwise from true north ("ned"). Sources of fields and signs:
+All are clockwise from true north ("ned"). Their fields stand in ``kinds``; what they mean:
 
-* HDT: NMEA 0183; heading, T.
-* THS: IEC 61162-1; heading, mode: A autonomous (and D, P, R, F as in RMC, or nothing); E estimated, M manual,
-  S simulator and V void are not measurements.
-* PASHR: Applanix POS MV V5 guide, table 20; NovAtel OEM7 and Trimble receiver help: time, heading, T, roll, pitch,
-  heave, sigmas of roll, pitch and heading, quality (0 is none everywhere, the other numbers differ), status of the
-  gyros. Roll is positive to starboard, the left side up, and pitch bow up (OxTS NMEA description; QPS driver manual,
-  "Applanix PASHR": roll positive heeling to starboard, pitch positive bow up): the signs of ahrs.csv.
-* PTNL,AVR: Trimble receiver help: time, yaw, "Yaw", tilt, "Tilt", roll, "Roll", length of the baseline, quality
-  (3 RTK fixed, 2 RTK float). Tilt is the baseline's inclination; the receiver writes Roll instead where it is told that
-  the antennas stand side by side.
-* KSXT: Unicore N4 commands reference; ComNav: heading in field 5, pitch in 6, roll in 9 where there are gyros, quality
-  of the heading in 11 (3 fixed, 2 float).
+* THS is a measurement with mode A, autonomous (and D, P, R, F as in RMC, or nothing); E estimated, M manual,
+  S simulator and V void are none.
+* PASHR: quality 0 is none everywhere, the other numbers differ. Roll is positive to starboard, the left side up, and
+  pitch bow up (OxTS NMEA description; QPS driver manual, "Applanix PASHR": roll positive heeling to starboard, pitch
+  positive bow up): the signs of ahrs.csv.
+* PTNL,AVR: quality 3 RTK fixed, 2 RTK float. Tilt is the baseline's inclination; the receiver writes Roll instead where
+  it is told that the antennas stand side by side.
+* KSXT: quality of the heading 3 fixed, 2 float.
 
 The inclination of a baseline is pitch where the second antenna stands in front of the first. A baseline across the
 robot adds 90° to the heading: the heading offset absorbs that.
@@ -22,27 +18,27 @@ robot adds 90° to the heading: the heading offset absorbs that.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import SIGMA_LIMIT_RAD
-from sccal.logs.nmea.positions import KIND_NAMES
-from sccal.logs.nmea.sentences import Kind, Sentences, talker_name
-from sccal.logs.nmea.times import UNTIMED, Dated, epoch_key, epochs_of_untimed
+from sccal.logs.nmea.kinds import LAYOUTS, READ_FOR_HEADINGS, UNTIMED, Heading, Kind
+from sccal.logs.nmea.sentences import Sentences, talker_name
+from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
 
-HEADING_KINDS = (Kind.PASHR, Kind.AVR, Kind.KSXT, Kind.THS, Kind.HDT)
-"""The ones that say more about their quality first."""
-HEADING_NAMES = ", ".join(KIND_NAMES[kind] for kind in reversed(HEADING_KINDS))
+HEADING_NAMES = ", ".join(LAYOUTS[kind].name for kind in reversed(READ_FOR_HEADINGS))
 
 _FIXED = 3
 _LEAST_SHARE = 0.1
 _LEAST_OF_RICHEST = 0.5
 _BASELINE_SHARE = 0.1
 _OFTENER = 1.5
+_AVR_LABELS = ((3, "Y"), (5, "T"), (7, "R"))
+"""Yaw, Tilt and Roll, each in the field after its value."""
 _THS_MEASURES = np.frombuffer(b"ADPRF\0", dtype=np.uint8)
 
 
@@ -69,7 +65,7 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
     readings = _best_kind(dated, source, notices)
     if readings is None:
         return None
-    name = f"{source} ({KIND_NAMES[readings.kind]})"
+    name = f"{source} ({LAYOUTS[readings.kind].name})"
     readings = _one_talker(dated, readings, name, notices)
     epoch_s, host_s = _epochs(dated, readings, name, notices)
     t_s = host_s if epoch_s is None else epoch_s
@@ -103,14 +99,14 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
 def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Readings | None:
     """The first kind that has at least half as many usable readings as the richest."""
     found: list[tuple[_Readings, list[Notice]]] = []
-    for kind in HEADING_KINDS:
+    for kind in READ_FOR_HEADINGS:
         usable = dated.sentences.kind == kind
         if kind not in UNTIMED:
             usable &= np.isfinite(dated.running_s)
         rows = np.flatnonzero(usable)
         if rows.size:
             own: list[Notice] = []
-            name = f"{source} ({KIND_NAMES[kind]})"
+            name = f"{source} ({LAYOUTS[kind].name})"
             found.append((_READERS[kind](dated.sentences.take(rows), rows, name, own), own))
     richest = max((readings.rows.size for readings, _ in found), default=0)
     if richest == 0:
@@ -121,34 +117,49 @@ def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Readings | 
     notices += own
     for readings, _ in found:
         if readings is not chosen and readings.rows.size:
-            what = f"headings not used because {KIND_NAMES[chosen.kind]} gives them too"
-            notices.append(Notice(f"{source} ({KIND_NAMES[readings.kind]})", what, readings.rows.size))
+            what = f"headings not used because {LAYOUTS[chosen.kind].name} gives them too"
+            notices.append(Notice(f"{source} ({LAYOUTS[readings.kind].name})", what, readings.rows.size))
     return chosen
+
+
+def _fields_of(kind: Kind) -> Heading:
+    heading = LAYOUTS[kind].heading
+    assert heading is not None
+    return heading
+
+
+def _read(own: Sentences, rows: Ints, kind: Kind) -> _Readings:
+    """All that sentences of one kind say, usable or not."""
+    fields = _fields_of(kind)
+    pitch, roll, sigma = (
+        None if field is None else own.number(field) for field in (fields.pitch, fields.roll, fields.sigma)
+    )
+    return _Readings(kind, rows, own.number(fields.yaw), pitch, roll, sigma)
 
 
 def _hdt(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
     begin, end = own.span(2)
     reference = own.letter(2)
-    readings = _Readings(Kind.HDT, rows, own.number(1))
-    return _plausible(own, readings, (reference == ord("T")) | (begin == end), own.span(1), name, notices)
+    readings = _read(own, rows, Kind.HDT)
+    return _plausible(own, readings, (reference == ord("T")) | (begin == end), name, notices)
 
 
 def _ths(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
-    readings = _Readings(Kind.THS, rows, own.number(1))
-    return _plausible(own, readings, np.isin(own.letter(2), _THS_MEASURES), own.span(1), name, notices)
+    return _plausible(own, _read(own, rows, Kind.THS), np.isin(own.letter(2), _THS_MEASURES), name, notices)
 
 
 def _pashr(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
-    readings = _Readings(Kind.PASHR, rows, own.number(2), own.number(5), own.number(4), own.number(9))
     measured = (own.letter(3) == ord("T")) & (own.number(10) != 0)
-    return _plausible(own, readings, measured, own.span(2), name, notices)
+    return _plausible(own, _read(own, rows, Kind.PASHR), measured, name, notices)
 
 
 def _avr(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
-    tilt = np.where(own.letters(5, 1)[:, 0] == ord("T"), own.number(4), np.nan)
-    roll = np.where(own.letters(7, 1)[:, 0] == ord("R"), own.number(6), np.nan)
-    labelled = own.letters(3, 1)[:, 0] == ord("Y")
-    readings = _Readings(Kind.AVR, rows, own.number(2), _or_none(tilt), _or_none(roll))
+    labelled, tilted, rolled = (own.letters(field, 1)[:, 0] == ord(mark) for field, mark in _AVR_LABELS)
+    readings = _read(own, rows, Kind.AVR)
+    assert readings.pitch_deg is not None
+    assert readings.roll_deg is not None
+    tilt, roll = np.where(tilted, readings.pitch_deg, np.nan), np.where(rolled, readings.roll_deg, np.nan)
+    readings = replace(readings, pitch_deg=_or_none(tilt), roll_deg=_or_none(roll))
     length_m = own.number(8)
     measured = labelled & _best_quality(own.number(9), name, own, notices)
     if measured.any() and np.isfinite(length_m[measured]).any():
@@ -159,14 +170,16 @@ def _avr(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readi
             notices.append(Notice(name, what, int(odd.sum()), f"line {own.line[odd][0]}"))
             own, rows, measured = own.take(np.flatnonzero(~odd)), rows[~odd], measured[~odd]
             readings = readings.take(~odd)
-    return _plausible(own, readings, measured, own.span(2), name, notices)
+    return _plausible(own, readings, measured, name, notices)
 
 
 def _ksxt(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
-    roll = _or_none(own.number(9))
-    readings = _Readings(Kind.KSXT, rows, own.number(5), _or_none(own.number(6)), roll)
+    readings = _read(own, rows, Kind.KSXT)
+    assert readings.pitch_deg is not None
+    assert readings.roll_deg is not None
+    readings = replace(readings, pitch_deg=_or_none(readings.pitch_deg), roll_deg=_or_none(readings.roll_deg))
     measured = _best_quality(own.number(11), name, own, notices)
-    return _plausible(own, readings, measured, own.span(5), name, notices)
+    return _plausible(own, readings, measured, name, notices)
 
 
 _READERS: dict[Kind, Callable[[Sentences, Ints, str, list[Notice]], _Readings]] = {
@@ -194,11 +207,10 @@ def _best_quality(quality: Floats, name: str, own: Sentences, notices: list[Noti
     return some
 
 
-def _plausible(
-    own: Sentences, readings: _Readings, measured: Bools, span: tuple[Ints, Ints], name: str, notices: list[Notice]
-) -> _Readings:
+def _plausible(own: Sentences, readings: _Readings, measured: Bools, name: str, notices: list[Notice]) -> _Readings:
     """The readings that are headings and measured; the others are told."""
-    empty = span[0] == span[1]
+    begin, end = own.span(_fields_of(readings.kind).yaw)
+    empty = begin == end
     possible = np.abs(readings.yaw_deg) <= 360.0
     for lost, what in (
         (empty | ~measured & possible, "sentences without a heading passed over"),

@@ -14,25 +14,10 @@ from sccal.errors import DataError
 from sccal.logs.decimals import words_of
 from sccal.logs.nmea.fixes import read_fixes
 from sccal.logs.nmea.headings import HEADING_NAMES, read_heading
-from sccal.logs.nmea.sentences import Kind, Sentences, all_lower, find_sentences
+from sccal.logs.nmea.kinds import LAYOUTS, READ
+from sccal.logs.nmea.sentences import Sentences, all_lower, find_sentences, kinds_in
 from sccal.logs.nmea.times import Dated, date_sentences
 from sccal.logs.streams import FixStream, HeadingStream, Notice
-
-_FIELDS_NEEDED = {
-    Kind.GGA: 13,
-    Kind.GNS: 10,
-    Kind.RMC: 9,
-    Kind.VTG: 7,
-    Kind.GST: 8,
-    Kind.ZDA: 4,
-    Kind.HDT: 1,
-    Kind.THS: 2,
-    Kind.PASHR: 9,
-    Kind.AVR: 9,
-    Kind.GGK: 10,
-    Kind.KSXT: 11,
-}
-"""So many fields at least after the address (PTNL,AVR and PTNL,GGK: after the name)."""
 
 
 def read_nmea(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
@@ -110,8 +95,8 @@ def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice
 def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Sentences:
     """The sentences of known kinds that can be relied on."""
     needed = np.zeros(256, dtype=np.int64)
-    needed[list(_FIELDS_NEEDED)] = list(_FIELDS_NEEDED.values())
-    ours = found.kind != Kind.OTHER
+    needed[list(LAYOUTS)] = [layout.fewest for layout in LAYOUTS.values()]
+    ours = kinds_in(found.kind, READ)
     wrong = found.has_checksum & ~found.right_checksum
     cut = ~found.has_checksum & ~found.complete
     lower = (found.data[found.start + 1] > ord("Z")) & ~all_lower(words_of(found.data), found.start)

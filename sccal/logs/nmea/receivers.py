@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Bools, Floats
-from sccal.logs.nmea.positions import KIND_NAMES, Positions
+from sccal.logs.nmea.kinds import LAYOUTS
+from sccal.logs.nmea.positions import Positions
 from sccal.logs.nmea.sentences import talker_name
 from sccal.logs.nmea.times import Dated, epoch_key
 from sccal.logs.streams import Notice
@@ -26,7 +27,7 @@ def one_receiver(dated: Dated, positions: Positions, source: str, notices: list[
     talker = dated.sentences.talker[positions.rows]
     if (talker == talker[0]).all():
         return _one_of_two(dated, positions, source, notices)
-    name = KIND_NAMES[positions.kind]
+    name = LAYOUTS[positions.kind].name
 
     def merit(one: int) -> tuple[int, ...]:
         own = positions.quality[talker == one]
@@ -103,7 +104,7 @@ def _one_of_two(dated: Dated, positions: Positions, source: str, notices: list[N
     merits = [tuple(int((positions.quality[track] == code).sum()) for code in _BEST_FIRST) for track in (one, two)]
     kept = one if merits[0] >= merits[1] else two
     what = (
-        f"{KIND_NAMES[positions.kind]} fixes dropped: two for each epoch, {apart_m:.2f} m apart, look like two "
+        f"{LAYOUTS[positions.kind].name} fixes dropped: two for each epoch, {apart_m:.2f} m apart, look like two "
         "receivers in one log, and only one of them is followed"
     )
     doubt = f"{source} holds the fixes of two receivers under one name; log each to a file of its own"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,14 @@ from numpy.typing import NDArray
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import PAD, Bytes, Decimals, Words, parse_decimals, read_decimals, words_of
 from sccal.logs.limits import TIME_LIMIT_S
+from sccal.logs.nmea.kinds import LAYOUTS, OF_SECOND_ANTENNA, Kind
 
 Kinds = NDArray[np.uint8]
 
 _LONGEST_SENTENCE = 512
 _SHORTEST_SENTENCE = 7
 """``$KSXT,`` and its like; what is shorter is not even counted, so that no file holds more of them than bytes by 7."""
+_ALL = slice(None)
 _LONGEST_PREFIX = 64
 _PIECE = 2**17
 _HEX = np.full(256, 255, dtype=np.uint8)
@@ -30,24 +31,6 @@ _HEX[np.frombuffer(b"0123456789ABCDEF", dtype=np.uint8)] = np.arange(16)
 _HEX[np.frombuffer(b"abcdef", dtype=np.uint8)] = np.arange(10, 16)
 _BETWEEN = np.isin(np.arange(256), np.frombuffer(b" \t\r,;:|=>])}\"'", dtype=np.uint8))
 _BEFORE = np.isin(np.arange(256), np.frombuffer(b" \t\r<[({\"'", dtype=np.uint8))
-
-
-class Kind(IntEnum):
-    """The sentences that are read, whatever their talker; the rest is OTHER."""
-
-    OTHER = 0
-    GGA = 1
-    GNS = 2
-    RMC = 3
-    VTG = 4
-    GST = 5
-    ZDA = 6
-    HDT = 7
-    THS = 8
-    PASHR = 9
-    AVR = 10
-    GGK = 11
-    KSXT = 12
 
 
 def _word(text: bytes) -> np.uint64:
@@ -61,12 +44,22 @@ def _pattern(text: bytes) -> tuple[np.uint64, np.uint64]:
 
 _SMALL = np.uint64(0x6060606060)
 _UPPER = np.uint64(0xDFDFDFDFDFDFDFDF)
-_PROPRIETARY = (Kind.PASHR, Kind.AVR, Kind.GGK, Kind.KSXT)
-_FORMATTERS = {_word(kind.name.encode()): kind for kind in Kind if kind not in (Kind.OTHER, *_PROPRIETARY)}
-_NAMES = {Kind.PASHR: _pattern(b"PASHR,"), Kind.KSXT: _pattern(b"KSXT,"), Kind.GGK: _pattern(b"PTNLGGK,")}
+_FORMATTERS = {_word(layout.name.encode()): kind for kind, layout in LAYOUTS.items() if len(layout.name) == 3}
+_NAMES = {
+    Kind.PASHR: _pattern(b"PASHR,"),
+    Kind.KSXT: _pattern(b"KSXT,"),
+    Kind.GGK: _pattern(b"PTNLGGK,"),
+    Kind.PUBX: _pattern(b"PUBX,00,"),
+}
 _TRIMBLE = _pattern(b"PTNL,")
 _TRIMBLE_NAMES = {Kind.AVR: _pattern(b"AVR,"), Kind.GGK: _pattern(b"GGK,")}
 """In the field after the address ``$PTNL``."""
+_ASHTECH_POSITION = _pattern(b"POS,")
+"""In the field after the address ``$PASHR``."""
+_TALKER_BITS = np.uint64(16)
+_LONG_ADDRESSES = {kind: _pattern(f"{first.name}H,".encode()) for kind, first in OF_SECOND_ANTENNA.items()}
+"""After the talker."""
+LONG_CHECKSUM_DIGITS = 8
 
 
 @dataclass(frozen=True)
@@ -85,6 +78,8 @@ class Sentences:
     """The two letters before the formatter, upper case, as one number (see talker_name); 0 for proprietary ones."""
     has_checksum: Bools
     right_checksum: Bools
+    long_checksum: Bools
+    """True where a right CRC-32 of 8 digits stands instead of two digits."""
     complete: Bools
     """False where the sentence is cut: by the next ``$`` or the end of the file."""
     line: Ints
@@ -109,6 +104,7 @@ class Sentences:
             self.talker[rows],
             self.has_checksum[rows],
             self.right_checksum[rows],
+            self.long_checksum[rows],
             self.complete[rows],
             self.line[rows],
             self.host_t_s[rows],
@@ -140,15 +136,17 @@ class Sentences:
         place = np.minimum(begin[:, None] + np.arange(most), self.data.size - 1)
         return np.where(place < end[:, None], _upper(self.data[place]), 0).astype(np.uint8)
 
-    def span(self, field: int) -> tuple[Ints, Ints]:
-        """Where field ``field`` (from 1) begins and ends in the buffer; empty where the sentence has not that many."""
-        mark = self.first_mark + (field - 1)
-        short = self.fields < field
+    def span(self, field: int, rows: Ints | slice = _ALL) -> tuple[Ints, Ints]:
+        """Where field ``field`` (from 1) begins and ends in the buffer; empty where the sentence has not that many.
+
+        Of the sentences at ``rows``, or of all.
+        """
+        mark = self.first_mark[rows] + (field - 1)
+        short = self.fields[rows] < field
         if not short.any():
             return self.marks[mark] + 1, self.marks[mark + 1]
-        mark = np.where(short, 0, mark)
-        begin = np.where(short, self.stop, self.marks[mark] + 1)
-        return begin, np.where(short, self.stop, self.marks[mark + 1])
+        mark, stop = np.where(short, 0, mark), self.stop[rows]
+        return np.where(short, stop, self.marks[mark] + 1), np.where(short, stop, self.marks[mark + 1])
 
 
 def kinds_in(kind: Kinds, wanted: Sequence[Kind]) -> Bools:
@@ -190,7 +188,9 @@ def find_sentences(raw: bytes) -> Sentences:
     high, low = _HEX[data[np.minimum(star + 1, size)]], _HEX[data[np.minimum(star + 2, size)]]
     has_checksum = (star + 2 < end) & (high < 16) & (low < 16)
     right = has_checksum & (_sums(data, start, stop) == high * 16 + low) & (stop > start + 1)
-    right |= _with_long_checksum(raw, kind, has_checksum & ~right, start, star, end)
+    long = has_checksum & (kind == Kind.KSXT) & (star + LONG_CHECKSUM_DIGITS < end)
+    long &= _with_long_checksum(raw, long & (_HEX[data[np.minimum(star + 3, size)]] < 16), start, star)
+    right |= long
     folded = np.flatnonzero(has_checksum & ~right & all_lower(words, start))
     if folded.size:
         right[folded] = _sums(_upper(data), start[folded], stop[folded]) == high[folded] * 16 + low[folded]
@@ -204,10 +204,11 @@ def find_sentences(raw: bytes) -> Sentences:
         data=data,
         start=start,
         stop=stop,
-        kind=_without_other_pashr(data, marks, first_mark, kind),
+        kind=_with_pashr_told_apart(data, marks, first_mark, kind),
         talker=talker,
         has_checksum=has_checksum,
         right_checksum=right,
+        long_checksum=long,
         complete=complete | has_checksum,
         line=line,
         host_t_s=host_t_s,
@@ -222,6 +223,17 @@ def all_lower(words: Words, start: Ints) -> Bools:
     """Where a program has written the whole address in lower case; its checksum is that of capital letters."""
     lower: Bools = (words[start + 1] & _SMALL) == _SMALL
     return lower
+
+
+def formatters(found: Sentences) -> NDArray[np.bytes_]:
+    """The three letters after the talker (n,), upper case; empty for what is not a five-letter address."""
+    address = found.data[found.start[:, None] + np.arange(1, 7)]
+    lower = (address >= 97) & (address <= 122)
+    address = np.where(lower, address - 32, address).astype(np.uint8)
+    letters = ((address[:, :5] >= 65) & (address[:, :5] <= 90)).all(axis=1)
+    usual = letters & (address[:, 5] == ord(",")) & (address[:, 0] != ord("P")) & (found.start + 6 < found.stop)
+    kinds = np.ascontiguousarray(address[:, 2:5]).view("S3").ravel()
+    return np.where(usual, kinds, b"").astype("S3")
 
 
 def _marks(body: Bytes) -> Iterator[Ints]:
@@ -262,6 +274,8 @@ def _kinds(words: Words, start: Ints, stop: Ints) -> tuple[Kinds, NDArray[np.uin
         for name, pattern in _TRIMBLE_NAMES.items():
             rows = trimble[_reads(words[start[trimble] + 6], pattern)]
             kind[rows], shift[rows] = name, 1
+        for name, pattern in _LONG_ADDRESSES.items():
+            kind[own[_reads(address[own] >> _TALKER_BITS, pattern)]] = name
     return kind, talker, shift
 
 
@@ -279,26 +293,31 @@ def _sums(data: Bytes, start: Ints, stop: Ints) -> Bytes:
     return np.asarray(np.bitwise_xor.reduceat(data, bounds)[::2])
 
 
-def _with_long_checksum(raw: bytes, kind: Kinds, wrong: Bools, start: Ints, star: Ints, end: Ints) -> Bools:
-    """True where a KSXT ends in the eight digits of a right CRC-32 instead of two, as ComNav receivers write it.
+def crc_32(text: bytes) -> int:
+    """The CRC that starts from zero and is not inverted at its end, as in NovAtel's logs."""
+    return zlib.crc32(text, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
-    The remainder starts at 0 and is not inverted at the end, as in NovAtel's logs.
-    """
-    right = np.zeros(kind.size, dtype=np.bool_)
-    for row in np.flatnonzero(wrong & (kind == Kind.KSXT) & (star + 8 < end)).tolist():
+
+def _with_long_checksum(raw: bytes, may: Bools, start: Ints, star: Ints) -> Bools:
+    """True where a KSXT ends in the eight digits of a right CRC-32 instead of two, as ComNav and Unicore write it."""
+    right = np.zeros(may.size, dtype=np.bool_)
+    for row in np.flatnonzero(may).tolist():
         try:
-            stated = int(raw[star[row] + 1 : star[row] + 9], 16)
+            stated = int(raw[star[row] + 1 : star[row] + 1 + LONG_CHECKSUM_DIGITS], 16)
         except ValueError:
             continue
-        right[row] = zlib.crc32(raw[start[row] + 1 : star[row]], 0xFFFFFFFF) ^ 0xFFFFFFFF == stated
+        right[row] = crc_32(raw[start[row] + 1 : star[row]]) == stated
     return right
 
 
-def _without_other_pashr(data: Bytes, marks: Ints, first_mark: Ints, kind: Kinds) -> Kinds:
+def _with_pashr_told_apart(data: Bytes, marks: Ints, first_mark: Ints, kind: Kinds) -> Kinds:
     """PASHR that begins with a time is attitude; Ashtech receivers write other things under a name in its place."""
     rows = np.flatnonzero(kind == Kind.PASHR)
-    named = _upper(data[marks[first_mark[rows]] + 1])
-    kind[rows[(named >= 65) & (named <= 90)]] = Kind.OTHER
+    begin = marks[first_mark[rows]] + 1
+    initial = _upper(data[begin])
+    named = (initial >= 65) & (initial <= 90)
+    kind[rows[named]] = Kind.OTHER
+    kind[rows[named & _reads(words_of(data)[begin], _ASHTECH_POSITION)]] = Kind.PASHR_POS
     return kind
 
 

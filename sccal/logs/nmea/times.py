@@ -13,20 +13,21 @@ time calculated with default parameters").
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.logs.nmea.sentences import Kind, Sentences, kinds_in
+from sccal.logs.decimals import Decimals
+from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_DATES, Date, Kind
+from sccal.logs.nmea.sentences import Sentences, kinds_in
 from sccal.logs.streams import Notice
 
 DAY_S = 86400.0
 ROLLOVER_DAYS = 1024 * 7
 UNIX_FROM_S = 1e9
 """Receive times from here on (2001) are Unix time; smaller ones count from an arbitrary zero."""
-UNTIMED = (Kind.VTG, Kind.HDT, Kind.THS)
-DATING = (Kind.RMC, Kind.ZDA, Kind.KSXT, Kind.GGK)
 
 _LONG_AGO_DAY = 14610  # 2010-01-01
 _TEN_TO = 10 ** np.arange(19, dtype=np.int64)
@@ -37,6 +38,7 @@ _LEAST_STEP_S = 0.75
 _FEWEST_ROWS = 5
 _SIDE_ROWS = 200
 _MOST_STEPS = 20
+_STAMPED = [kind for kind, layout in LAYOUTS.items() if layout.date is not None and layout.date.form == "stamp"]
 _BURST_SHARE = 0.75
 """Of the time between epochs: sentences that lie further apart than this do not belong together."""
 
@@ -62,10 +64,10 @@ class Dated:
 
 def date_sentences(sentences: Sentences, source: str, notices: list[Notice]) -> Dated:
     """Give every sentence its epoch; what had to be mended for it is told."""
-    tod_s = _time_of_day(sentences)
+    tod_s = times_of_day(sentences, READ)
     timed = np.flatnonzero(np.isfinite(tod_s))
     running_s = np.full(tod_s.size, np.nan)
-    running_s[timed] = _unwrapped(tod_s[timed])
+    running_s[timed] = unwrapped(tod_s[timed])
     _mend_steps(sentences, running_s, timed, source, notices)
     midnight_s, has_date = _midnights(sentences, tod_s, running_s, timed, source, notices)
     if has_date:
@@ -110,26 +112,33 @@ def epochs_of_untimed(dated: Dated, rows: Ints) -> Floats:
     return np.where(nearest, epoch_s, np.nan)
 
 
-def _time_of_day(sentences: Sentences) -> Floats:
-    """(n) seconds since midnight, NaN where no time is stated or the field is none."""
+def times_of_day(sentences: Sentences, kinds: Iterable[Kind]) -> Floats:
+    """(n) seconds since midnight by sentences of some kinds; NaN where no time is stated or the field is none."""
     tod_s = np.full(sentences.start.size, np.nan)
-    rows = np.flatnonzero(~kinds_in(sentences.kind, (Kind.OTHER, *UNTIMED)))
-    stated = sentences.take(rows).decimals(1)
+    kinds = [kind for kind in kinds if LAYOUTS[kind].time is not None]
+    for field in {LAYOUTS[kind].time for kind in kinds}:
+        assert field is not None
+        rows = np.flatnonzero(kinds_in(sentences.kind, [kind for kind in kinds if LAYOUTS[kind].time == field]))
+        if rows.size:
+            stamps = kinds_in(sentences.kind[rows], _STAMPED)
+            tod_s[rows] = _seconds_of_day(sentences.take(rows).decimals(field), stamps)
+    return tod_s
+
+
+def _seconds_of_day(stated: Decimals, stamps: Bools) -> Floats:
+    """Out of ``hhmmss.ss`` (n,), with the date before it in stamps."""
     whole = np.where(stated.good & (stated.places <= _MOST_PLACES), stated.mantissa, -1)
-    places = np.minimum(stated.places, _MOST_PLACES)
-    ksxt = sentences.kind[rows] == Kind.KSXT
-    if ksxt.any():
-        whole = np.where(ksxt, np.where(whole >= 0, whole % (10**6 * _TEN_TO[places]), -1), whole)
-    unit = _TEN_TO[places]
+    unit = _TEN_TO[np.minimum(stated.places, _MOST_PLACES)]
+    if stamps.any():
+        whole = np.where(stamps, np.where(whole >= 0, whole % (10**6 * unit), -1), whole)
     minutes, seconds = np.divmod(whole, 100 * unit)
     seconds_s = seconds / unit
     hours, minutes = np.divmod(minutes, 100)
     plausible = (whole >= 0) & (hours < 24) & (minutes < 60) & (seconds_s < 61)
-    tod_s[rows] = np.where(plausible, hours * 3600 + minutes * 60 + seconds_s, np.nan)
-    return tod_s
+    return np.where(plausible, hours * 3600 + minutes * 60 + seconds_s, np.nan)
 
 
-def _unwrapped(tod_s: Floats) -> Floats:
+def unwrapped(tod_s: Floats) -> Floats:
     """Times of day counted on past midnight."""
     days = np.round(np.diff(tod_s) / DAY_S)
     if not days.any():
@@ -209,12 +218,13 @@ def _dates(sentences: Sentences, timed: Ints) -> tuple[Ints, Floats]:
     """Rows that state a date (m,), of the best source that there is, and their days since 1970-01-01 (m,)."""
     kind = sentences.kind[timed]
     void: tuple[Ints, Floats] | None = None
-    for source in DATING:
+    for source in READ_FOR_DATES:
         rows = timed[kind == source]
         if rows.size == 0:
             continue
-        own = sentences.take(rows)
-        day = _days_of(own, source)
+        own, date = sentences.take(rows), LAYOUTS[source].date
+        assert date is not None
+        day = days_stated(own, date)
         good = np.isfinite(day)
         if source == Kind.RMC:
             void = rows[good], day[good]
@@ -224,21 +234,21 @@ def _dates(sentences: Sentences, timed: Ints) -> tuple[Ints, Floats]:
     return void if void is not None else (timed[:0], np.empty(0))
 
 
-def _days_of(own: Sentences, kind: Kind) -> Floats:
+def days_stated(own: Sentences, date: Date) -> Floats:
     """(n) days since 1970-01-01 stated by sentences of one kind, NaN for impossible dates."""
-    if kind == Kind.ZDA:
-        day, month, year = (own.decimals(field) for field in (2, 3, 4))
+    if date.form == "dd,mm,yyyy":
+        day, month, year = (own.decimals(field) for field in date.fields)
         good = day.good & month.good & year.good & (day.places + month.places + year.places == 0)
         return _days(day.mantissa, month.mantissa, year.mantissa, good)
-    stated = own.decimals({Kind.RMC: 9, Kind.GGK: 2, Kind.KSXT: 1}[kind])
+    stated = own.decimals(date.fields[0])
     good = stated.good & (stated.mantissa >= 0)
-    if kind == Kind.KSXT:
+    if date.form == "stamp":
         packed = stated.mantissa // (10**6 * _TEN_TO[np.minimum(stated.places, _MOST_PLACES)])
         return _days(packed % 100, packed // 100 % 100, packed // 10000, good & (packed >= 19800106))
     first, second, short = stated.mantissa // 10000, stated.mantissa // 100 % 100, stated.mantissa % 100
     years = short + np.where(short >= 80, 1900, 2000)
     good &= stated.places == 0
-    if kind == Kind.RMC:
+    if date.form == "ddmmyy":
         return _days(first, second, years, good)
     american = _days(second, first, years, good)
     return american if np.isfinite(american).any() else _days(first, second, years, good)
@@ -247,7 +257,7 @@ def _days_of(own: Sentences, kind: Kind) -> Floats:
 def _days(day: Ints, month: Ints, year: Ints, good: Bools) -> Floats:
     good = good & (day >= 1) & (month >= 1) & (month <= 12) & (year >= 1970) & (year < 2200)
     packed = np.where(good, ((year - 1970) * 12 + month - 1) * 32 + day, 0)
-    starts = np.flatnonzero(np.concatenate(([True], np.diff(packed) != 0)))
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(packed) != 0))[: packed.size])
     months, days = packed[starts] // 32, packed[starts] % 32
     first = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
     length = (months + 1).astype("datetime64[M]").astype("datetime64[D]").astype(np.int64) - first

@@ -1,0 +1,280 @@
+"""The kinds of sentences: where each holds what, how it tells the quality of a fix, and how a lost fix looks in it.
+
+One row of LAYOUTS is all that the reader and ``sccal degrade`` know of a kind. Fields are counted from 1 after the
+address, $PTNL's after the name that follows it. All qualities are told in the numbers of GGA. Sources:
+
+* GGA, GNS, RMC, GLL, VTG, GST, ZDA, HDT: NMEA 0183 version 4.10 and IEC 61162-1. Mode letters: A autonomous,
+  D differential, E estimated, F float RTK, M manual, N no fix, P precise, R real-time kinematic, S simulator. GNS has
+  one letter for each constellation, N where it is not used: the position is as good as the best that took part, and
+  this is what receivers then state in GGA. THS: IEC 61162-1; heading, mode.
+* PTNL,GGK: Trimble receiver help, and Spectra Geospatial, "GGKx": date mmddyy, height above the ellipsoid after EHT.
+  PTNL,AVR: Trimble receiver help: time, yaw, "Yaw", tilt, "Tilt", roll, "Roll", length of the baseline, quality.
+* KSXT: Unicore N4 and reference commands: longitude first, degrees, date and time in one field, speeds in km/h, and
+  east, north, up from the base. ComNav: heading in field 5, pitch in 6, roll in 9 where there are gyros.
+* PASHR: Applanix POS MV V5 guide, table 20; NovAtel OEM7 and Trimble receiver help: time, heading, T, roll, pitch,
+  heave, sigmas of roll, pitch and heading, quality. PASHR,POS: Ashtech.
+* PUBX,00: u-blox M8 protocol specification.
+
+Unicore's second antenna sends the usual sentences with an H at the end of the address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from types import MappingProxyType
+from typing import Literal
+
+
+class Kind(IntEnum):
+    """The sentences that are known, whatever their talker; the rest is OTHER."""
+
+    OTHER = 0
+    GGA = 1
+    GNS = 2
+    RMC = 3
+    VTG = 4
+    GST = 5
+    ZDA = 6
+    HDT = 7
+    THS = 8
+    PASHR = 9
+    AVR = 10
+    GGK = 11
+    KSXT = 12
+    GLL = 13
+    PUBX = 14
+    PASHR_POS = 15
+    GGA_H = 16
+    RMC_H = 17
+    GNS_H = 18
+    GLL_H = 19
+
+
+NO_FIX = 0
+NOT_STATED = -1
+_NOTHING: Mapping[str, int] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Claim:
+    """How a kind of sentence states the quality of its fix."""
+
+    form: Literal["number", "letter", "letters", "word"]
+    """One number, one mode letter, one for each constellation (the best one counts), or one of some words."""
+    read: Mapping[str, int]
+    """GGA quality by what is written, worse mode letters first."""
+    written: Mapping[int, str]
+    """What is written for each GGA quality."""
+    unknown: int = NOT_STATED
+    """The quality of another number above zero."""
+
+
+_MODES = {"N": 0, "S": 8, "M": 7, "E": 6, "A": 1, "P": 3, "D": 2, "F": 5, "R": 4}
+MODE_LETTERS = {quality: letter for letter, quality in _MODES.items()} | {9: "D"}
+"""Mode letters by GGA quality."""
+_NUMBERS = {str(quality): quality for quality in range(10)}
+_GGA = Claim("number", _NUMBERS, {quality: text for text, quality in _NUMBERS.items()}, unknown=NO_FIX)
+_MODE = Claim("letter", _MODES, MODE_LETTERS)
+_GGK = Claim(
+    "number",
+    dict(zip(map(str, range(15)), (0, 1, 5, 4, 2, 2, 5, 4, 5, 4, 5, 2, 5, 2, 5), strict=True)),
+    {0: "0", 1: "1", 2: "4", 3: "4", 4: "3", 5: "2", 6: "1", 7: "1", 8: "3", 9: "4"},
+)
+"""0 none, 1 autonomous, 2 RTK float, 3 RTK fixed, 4 DGPS, 5 SBAS, 6/8 network RTK float, 7/9 network RTK fixed,
+10 OmniSTAR HP, 11 OmniSTAR VBS, 12 location RTK, 13 beacon DGPS, 14 RTK global."""
+_KSXT = Claim(
+    "number",
+    {"0": 0, "1": 1, "2": 5, "3": 4},
+    {0: "0", 1: "1", 2: "1", 3: "1", 4: "3", 5: "2", 6: "1", 7: "1", 8: "3", 9: "1"},
+)
+_PUBX = Claim(
+    "word",
+    {"NF": 0, "DR": 6, "G2": 1, "G3": 1, "D2": 2, "D3": 2, "RK": 6, "TT": 0},
+    {0: "NF", 1: "G3", 2: "D3", 3: "G3", 4: "D3", 5: "D3", 6: "DR", 7: "G3", 8: "G3", 9: "D3"},
+)
+_ASHTECH = Claim(
+    "word",
+    {"0": 1, "1": 2, "2": 5, "3": 4},
+    {0: "", 1: "0", 2: "1", 3: "0", 4: "3", 5: "2", 6: "0", 7: "0", 8: "3", 9: "1"},
+)
+
+
+@dataclass(frozen=True)
+class Position:
+    """The fields of a position and what goes with it."""
+
+    latitude: int
+    longitude: int
+    quality: int
+    claim: Claim
+    in_degrees: bool = False
+    """Signed decimal degrees; else degrees and minutes, with the hemisphere in the field after."""
+    status: int | None = None
+    """Field that is A with a fix and V without."""
+    altitude_m: int | None = None
+    separation_m: int | None = None
+    """What to add to the altitude for a height above the ellipsoid, where it is given."""
+    hdop: int | None = None
+    accuracy_m: int | None = None
+    """The receiver's own error estimate."""
+    from_base_m: tuple[int, int] | None = None
+    """East and north of the base."""
+    extras: Mapping[str, int] = field(default_factory=lambda: _NOTHING)
+    """Further columns."""
+    emptied: tuple[int, ...] = ()
+    """What a receiver without a fix leaves empty, besides the position."""
+    lost: tuple[tuple[int, str], ...] = ()
+    """What it writes instead of other fields."""
+
+
+@dataclass(frozen=True)
+class Date:
+    """The field or fields of a date, and their form; a stamp is year, month, day and the time in one."""
+
+    fields: tuple[int, ...]
+    form: Literal["ddmmyy", "mmddyy", "dd,mm,yyyy", "stamp"]
+
+
+@dataclass(frozen=True)
+class Speed:
+    """The fields of the speed over ground, and the one that tells whether it holds."""
+
+    knots: int | None = None
+    kmph: int | None = None
+    told_by: int | None = None
+    holds: str = ""
+    """The letter with which it holds."""
+    holds_not: str = ""
+    """The letter with which it does not."""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """The fields of a heading clockwise from true north, and of what goes with it, all in degrees."""
+
+    yaw: int
+    pitch: int | None = None
+    roll: int | None = None
+    sigma: int | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """One kind of sentence."""
+
+    name: str
+    """As users write it."""
+    fewest: int
+    """Fields below which a sentence is not whole."""
+    time: int | None = None
+    """None: it belongs to the epoch among whose sentences it stands."""
+    date: Date | None = None
+    position: Position | None = None
+    speed: Speed | None = None
+    heading: Heading | None = None
+
+
+LAYOUTS: dict[Kind, Layout] = {
+    Kind.GGA: Layout(
+        "GGA",
+        fewest=13,
+        time=1,
+        position=Position(
+            2, 4, quality=6, claim=_GGA, altitude_m=9, separation_m=11, hdop=8,
+            extras={"hdop": 8, "satellites": 7, "age_s": 13},
+            emptied=(9, 10, 11, 12, 13, 14), lost=((6, "0"), (7, "00"), (8, "99.99")),
+        ),
+    ),
+    Kind.GNS: Layout(
+        "GNS",
+        fewest=10,
+        time=1,
+        position=Position(
+            2, 4, quality=6, claim=replace(_MODE, form="letters"), altitude_m=9, separation_m=10, hdop=8,
+            extras={"hdop": 8, "satellites": 7, "age_s": 11},
+            emptied=(9, 10, 11, 12), lost=((7, "00"), (8, "99.99")),
+        ),
+    ),
+    Kind.RMC: Layout(
+        "RMC",
+        fewest=9,
+        time=1,
+        date=Date((9,), "ddmmyy"),
+        speed=Speed(knots=7, told_by=2, holds="A"),
+        position=Position(
+            3, 5, quality=12, claim=_MODE, status=2, emptied=(7, 8, 10, 11), lost=((2, "V"), (12, "N"))
+        ),
+    ),
+    Kind.GLL: Layout(
+        "GLL",
+        fewest=5,
+        time=5,
+        position=Position(1, 3, quality=7, claim=_MODE, status=6, lost=((6, "V"), (7, "N"))),
+    ),
+    Kind.GGK: Layout(
+        "PTNL,GGK",
+        fewest=10,
+        time=1,
+        date=Date((2,), "mmddyy"),
+        position=Position(
+            3, 5, quality=7, claim=_GGK, altitude_m=10, hdop=9, extras={"dop": 9, "satellites": 8},
+            emptied=(9, 10), lost=((7, "0"), (8, "00")),
+        ),
+    ),
+    Kind.KSXT: Layout(
+        "KSXT",
+        fewest=11,
+        time=1,
+        date=Date((1,), "stamp"),
+        speed=Speed(kmph=8),
+        heading=Heading(5, pitch=6, roll=9),
+        position=Position(
+            3, 2, quality=10, claim=_KSXT, in_degrees=True, altitude_m=4, from_base_m=(14, 15),
+            extras={"satellites": 13, "age_s": 20},
+            emptied=(4, 7, 8, 14, 15, 16, 17, 18, 19), lost=((10, "0"),),
+        ),
+    ),
+    Kind.PUBX: Layout(
+        "PUBX,00",
+        fewest=18,
+        time=2,
+        position=Position(
+            3, 5, quality=8, claim=_PUBX, hdop=15, accuracy_m=9, emptied=(7, 9, 10, 11, 12, 13, 14),
+            lost=((8, "NF"), (15, "99.99"), (16, "99.99"), (17, "99.99"), (18, "0")),
+        ),
+    ),
+    Kind.PASHR_POS: Layout(
+        "PASHR,POS",
+        fewest=16,
+        time=4,
+        position=Position(
+            5, 7, quality=2, claim=_ASHTECH, hdop=15, emptied=(2, 9, 11, 12, 13), lost=((3, "00"), (15, "99.99"))
+        ),
+    ),
+    Kind.PASHR: Layout("PASHR", fewest=9, time=1, heading=Heading(2, pitch=5, roll=4, sigma=9)),
+    Kind.AVR: Layout("PTNL,AVR", fewest=9, time=1, heading=Heading(2, pitch=4, roll=6)),
+    Kind.THS: Layout("THS", fewest=2, heading=Heading(1)),
+    Kind.HDT: Layout("HDT", fewest=1, heading=Heading(1)),
+    Kind.VTG: Layout("VTG", fewest=7, speed=Speed(knots=5, kmph=7, told_by=9, holds_not="N")),
+    Kind.GST: Layout("GST", fewest=8, time=1),
+    Kind.ZDA: Layout("ZDA", fewest=4, time=1, date=Date((2, 3, 4), "dd,mm,yyyy")),
+}  # fmt: skip
+OF_SECOND_ANTENNA = {Kind.GGA_H: Kind.GGA, Kind.RMC_H: Kind.RMC, Kind.GNS_H: Kind.GNS, Kind.GLL_H: Kind.GLL}
+"""The same sentences of a second antenna, by the first one's."""
+LAYOUTS |= {own: replace(LAYOUTS[first], name=f"{first.name}H") for own, first in OF_SECOND_ANTENNA.items()}
+
+GST_SIGMAS, GST_BEARING = (3, 4, 6, 7), 5
+"""Fields of GST: semi-major and semi-minor axis, north, east; and the bearing of the major axis."""
+READ_FOR_POSITIONS = (Kind.GGA, Kind.GNS, Kind.GGK, Kind.KSXT, Kind.RMC)
+"""By how much they say about their quality."""
+READ_FOR_HEADINGS = (Kind.PASHR, Kind.AVR, Kind.KSXT, Kind.THS, Kind.HDT)
+"""The ones that say more about their quality first."""
+PLACED = tuple(kind for kind, layout in LAYOUTS.items() if layout.position is not None)
+"""All that hold a position."""
+READ_FOR_SPEEDS = (Kind.RMC, Kind.KSXT, Kind.VTG)
+READ_FOR_DATES = (Kind.RMC, Kind.ZDA, Kind.KSXT, Kind.GGK)
+READ = tuple({*READ_FOR_POSITIONS, *READ_FOR_HEADINGS, *READ_FOR_SPEEDS, *READ_FOR_DATES, Kind.GST})
+"""What the reader takes; the rest is passed over."""
+UNTIMED = tuple(kind for kind in READ if LAYOUTS[kind].time is None)
