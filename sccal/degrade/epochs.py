@@ -13,14 +13,14 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import read_digits
-from sccal.logs.nmea.kinds import LAYOUTS, NO_FIX, NOT_STATED, PLACED, Kind, Position
+from sccal.logs.nmea.kinds import LAYOUTS, NO_FIX, NOT_STATED, PLACED, READ_FOR_POSITIONS, Kind, Position
 from sccal.logs.nmea.positions import position_of
 from sccal.logs.nmea.quality import stated_quality
 from sccal.logs.nmea.sentences import Sentences, kinds_in
 from sccal.logs.nmea.times import DAY_S, days_stated, epoch_key, times_of_day, unwrapped
 
-_BEST_FIRST = (Kind.GGA, Kind.RMC, Kind.GNS, Kind.GLL, Kind.GGK, Kind.KSXT, Kind.PUBX, Kind.PASHR_POS)
-"""Where an epoch has several, the first of these says where the fix was."""
+_BEST_FIRST = (*READ_FOR_POSITIONS, Kind.GLL, Kind.PUBX, Kind.PASHR_POS)
+"""Where an epoch has several, the first of these says where the fix was, and how good: that of the reader."""
 _RANK = np.full(len(Kind), len(_BEST_FIRST), dtype=np.int64)
 _RANK[list(_BEST_FIRST)] = np.arange(len(_BEST_FIRST))
 

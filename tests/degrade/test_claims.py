@@ -80,3 +80,15 @@ def test_the_shortest_sentence_that_is_read_is_degraded(make, claim, fields):
     after, _ = parse_nmea(degrade_nmea(raw, Faults(sigma_m=SIGMA_M), None, "run").raw, "gnss.nmea")
     assert before.lat_deg.size == after.lat_deg.size == 20
     assert (before.lat_deg != after.lat_deg).all()
+
+
+@pytest.mark.parametrize(("make", "claim"), [(gns, "RR"), (ggk, "3"), (ksxt, "3")])
+@pytest.mark.parametrize("mode", ["", "D"])
+def test_the_sentences_that_are_read_decide_what_an_epoch_claims(make, claim, mode):
+    """RMC says less about its quality than the others, or nothing, and is read where there is nothing else."""
+    raw = "\n".join(line for i in range(20) for line in (rmc_of(NOON + i, mode), make(NOON + i, claim))).encode()
+    read, _ = parse_nmea(raw, "gnss.nmea")
+    done = degrade_nmea(raw, Faults(sigma_m=1.0), None, "run")
+    assert done.epochs.quality.tolist() == read.quality.tolist() == [4] * 20
+    after, _ = parse_nmea(done.raw, "gnss.nmea")
+    assert (table_sigma_m(after.quality) >= 1.0).all()
