@@ -12,16 +12,15 @@ from sccal.arrays import Floats, Ints
 from sccal.degrade.faults import Faults, drift_deg, dropped_rows, fault_fixes
 from sccal.degrade.nmea import degrade_nmea
 from sccal.errors import DataError
-from sccal.logs.mcap_fixes import has_positions, lines_of_sentences, quality_of
+from sccal.logs.mcap_fixes import has_positions, lines_of_sentences
 from sccal.logs.mcap_heading import has_orientation
 from sccal.logs.mcap_tables import ConversionNote
 from sccal.logs.mcap_topics import FIELDS, Messages, normal_path
+from sccal.logs.quality import navsat_status, quality_of
 from sccal.logs.reference import ReferenceRows
 from sccal.logs.streams import Convention
 from sccal.logs.timeline import order_in_time
 
-_STATUS = {0: -1, 2: 1, 3: 1, 9: 1, 4: 2, 5: 2}
-"""NavSatStatus by GGA quality; 0, a fix, for all others."""
 _POSITIONS = ("NavSatFix", "GPSFix", "LocationFix")
 
 
@@ -190,7 +189,7 @@ def _positions(messages: Messages, log: LogOfMessages, faults: Faults, changes: 
                 _put_side(side, "lon_deg", row, float(moved_lon), changes)
         if claimed[row]:
             if with_status[row]:
-                changes.put(topic, number, paths["status"], _STATUS.get(int(done.quality[row]), 0))
+                changes.put(topic, number, paths["status"], navsat_status(int(done.quality[row])))
             _put_side(side, "fix_quality", row, float(done.quality[row]), changes)
         if widened[row]:
             if stated[row]:

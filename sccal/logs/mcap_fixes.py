@@ -1,40 +1,21 @@
-"""Fixes out of messages: NavSatFix, GPSFix, LocationFix, NMEA sentences, or latitude and longitude at any path.
-
-NavSatStatus says less than GGA: −1 no fix, 0 a fix, 1 with satellite corrections, 2 with corrections from the ground.
-Drivers give 2 for RTK, fixed or float. So status 0 is quality 1, 1 is 2, and 2 is 4 (RTK fixed) unless the covariance
-states more than RTK_FIXED_M, then 5 (float). A type without status is −1, not stated.
-"""
+"""Fixes out of messages: NavSatFix, GPSFix, LocationFix, NMEA sentences, or latitude and longitude at any path."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sccal.arrays import Bools, Floats, Ints
+from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.mcap_topics import STAMPED, Messages
 from sccal.logs.mcap_wheels import of_messages
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
+from sccal.logs.quality import quality_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
 
-RTK_FIXED_M = 0.1
-"""Between the 0.01 to 0.03 m that receivers state for RTK fixed and the 0.2 m and more for float."""
-
-
 _SMALL_S = 1e8
 _ONE_LINE = bytes.maketrans(b"\r\n", b"  ")
-
-
-def quality_of(status: Floats, sigma_m: Floats) -> Ints:
-    """GGA quality (n) for NavSatStatus or GPSStatus (n, NaN where there is none) and the stated sigma (n, m)."""
-    quality = np.full(status.size, -1, dtype=np.int64)
-    quality[status < 0] = 0
-    quality[status == 0] = 1
-    quality[(status == 1) | (status > 2)] = 2
-    quality[status == 2] = 4
-    quality[(status == 2) & (sigma_m > RTK_FIXED_M)] = 5
-    return quality
 
 
 def fixes_of_positions(messages: Messages, path: str, source: str) -> tuple[FixStream, tuple[Notice, ...]]:

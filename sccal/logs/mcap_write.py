@@ -22,11 +22,10 @@ from sccal.errors import DataError
 from sccal.logs.mcap_definitions import full_text, known_definitions
 from sccal.logs.mcap_ros import RosWalker
 from sccal.logs.mcap_tables import LEFT_JOINT, RIGHT_JOINT
+from sccal.logs.quality import navsat_status
 from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream
 
 WHEELS_TOPIC, HEADING_TOPIC, FIX_TOPIC, NMEA_TOPIC = "/joint_states", "/imu/data", "/fix", "/nmea_sentence"
-_STATUS = {0: -1, 2: 1, 3: 1, 9: 1, 4: 2, 5: 2}
-"""NavSatStatus by GGA quality; 0, a fix, for all others."""
 _SENTENCE = re.compile(rb"^\s*([-+]?\d+(?:\.\d+)?)[\s,;]+(\$[^\r\n]*)", re.MULTILINE)
 
 
@@ -156,7 +155,7 @@ def nav_sat_numbers(fixes: FixStream) -> dict[str, Floats]:
     """The fields (n) of those messages by path."""
     stated = np.isfinite(fixes.sigma_east_m) & np.isfinite(fixes.sigma_north_m)
     return {
-        "status.status": np.array([_STATUS.get(code, 0) for code in fixes.quality.tolist()], dtype=np.float64),
+        "status.status": np.array([navsat_status(code) for code in fixes.quality.tolist()], dtype=np.float64),
         "latitude": fixes.lat_deg,
         "longitude": fixes.lon_deg,
         "altitude": fixes.alt_m,

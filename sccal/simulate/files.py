@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sccal.logs.nmea.kinds import MODE_LETTERS
 from sccal.logs.streams import Vehicle
 from sccal.logs.write import gga, gst, rmc, write_table, write_text, write_vehicle, zda
 from sccal.simulate.physics import Physics
@@ -28,8 +29,6 @@ from sccal.simulate.settings import (
 
 TRUTH_SCHEMA = "sccal.truth/1"
 _LINE_GAP_S = 0.001
-_RMC_MODES = {0: "N", 1: "A", 2: "D", 4: "R", 5: "F", 6: "E"}
-"""By the quality in GGA."""
 
 
 def write_vehicle_file(settings: SimulationSettings, folder: Path) -> Path:
@@ -90,7 +89,7 @@ def nmea_lines(simulated: SimulatedRun) -> list[str]:
         if settings.with_gst:
             sentences.append(gst(utc, sigma_m, sigma_m))
         if whole:
-            sentences += [rmc(utc, lat, lon, speed, course, _RMC_MODES.get(quality, "A")), zda(utc)]
+            sentences += [rmc(utc, lat, lon, speed, course, MODE_LETTERS.get(quality, "A")), zda(utc)]
         if settings.with_host_time:
             sentences = [f"{host + i * _LINE_GAP_S:.4f} {sentence}" for i, sentence in enumerate(sentences)]
         lines += sentences

@@ -22,11 +22,11 @@ from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.single import calibrate_run
 from sccal.errors import DataError, UsageError
 from sccal.logs.mcap_definitions import full_text
-from sccal.logs.mcap_fixes import quality_of
 from sccal.logs.mcap_heading import euler
 from sccal.logs.mcap_topics import seconds_of
 from sccal.logs.mcap_write import nanoseconds_of, write_mcap
 from sccal.logs.options import ReadOptions
+from sccal.logs.quality import quality_of
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
 from tests.message_logs import (
