@@ -71,21 +71,10 @@ class _Changed:
 
 def _nmea(raw: bytes, task: Task) -> _Changed:
     done = degrade_nmea(raw, task.faults, task.span_s, task.name)
-    epochs, fixes, read = done.epochs, done.fixes, done.epochs.read
-    dated = np.isfinite(epochs.utc_s).all()
-    rows = ReferenceRows(
-        t_s=epochs.host_t_s[read],
-        utc_s=(epochs.utc_s if dated else epochs.epoch_s)[read],
-        lat_deg=epochs.lat_deg[read],
-        lon_deg=epochs.lon_deg[read],
-        quality=epochs.quality[read],
-        lost=fixes.lost[read],
-        displaced=fixes.displaced[read],
-    )
     sentences = {"rewritten": dict(sorted(done.rewritten.items())), "left": dict(sorted(done.left.items()))}
     wrong = done.left["wrong checksum"]
     notices = (f"{wrong} sentences with a wrong checksum left as they were",) if wrong else ()
-    return _Changed(done.raw, {"sentences": sentences}, rows, int(fixes.outlier[read].sum()), notices)
+    return _Changed(done.raw, {"sentences": sentences}, done.reference(), done.outliers, notices)
 
 
 def _gnss_csv(raw: bytes, task: Task) -> _Changed:

@@ -133,18 +133,7 @@ def _sentences(messages: Messages, log: LogOfMessages, faults: Faults, changes: 
             changes.texts[messages.topic, number] = after[row][after[row].find(b"$") :]
             changes.rewritten[messages.topic] += 1
     if changes.rows is None:
-        epochs, fixes, read = done.epochs, done.fixes, done.epochs.read
-        dated = np.isfinite(epochs.utc_s).all()
-        changes.rows = ReferenceRows(
-            t_s=epochs.host_t_s[read],
-            utc_s=(epochs.utc_s if dated else epochs.epoch_s)[read],
-            lat_deg=epochs.lat_deg[read],
-            lon_deg=epochs.lon_deg[read],
-            quality=epochs.quality[read],
-            lost=fixes.lost[read],
-            displaced=fixes.displaced[read],
-        )
-        changes.outliers = int(fixes.outlier[read].sum())
+        changes.rows, changes.outliers = done.reference(), done.outliers
 
 
 def _positions(messages: Messages, log: LogOfMessages, faults: Faults, changes: Changes) -> None:

@@ -20,6 +20,7 @@ from sccal.degrade.rewriting import Plan, rewritten_piece
 from sccal.errors import DataError
 from sccal.logs.nmea.kinds import LAYOUTS, PLACED, Kind
 from sccal.logs.nmea.sentences import Sentences, find_sentences, formatters, kinds_in
+from sccal.logs.reference import ReferenceRows
 
 _PIECE_BYTES = 1 << 20
 _THREADS = 2
@@ -40,6 +41,25 @@ class DegradedNmea:
     """Sentences by kind; with ``drop``, those left out too."""
     left: Counter[str]
     """Sentences by kind that stayed as they were."""
+
+    @property
+    def outliers(self) -> int:
+        """How many of the fixes that are read jump."""
+        return int(self.fixes.outlier[self.epochs.read].sum())
+
+    def reference(self) -> ReferenceRows:
+        """The fixes that are read, as they were, and what became of them."""
+        epochs, fixes, read = self.epochs, self.fixes, self.epochs.read
+        dated = np.isfinite(epochs.utc_s).all()
+        return ReferenceRows(
+            t_s=epochs.host_t_s[read],
+            utc_s=(epochs.utc_s if dated else epochs.epoch_s)[read],
+            lat_deg=epochs.lat_deg[read],
+            lon_deg=epochs.lon_deg[read],
+            quality=epochs.quality[read],
+            lost=fixes.lost[read],
+            displaced=fixes.displaced[read],
+        )
 
 
 def degrade_nmea(raw: bytes, faults: Faults, span_s: tuple[float, float] | None, stream_name: str) -> DegradedNmea:
