@@ -221,20 +221,27 @@ def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float
             gains = np.array([gain({**shapes, name: float(point)}) for point in points])
             shapes[name] = float(points[int(np.argmax(gains))])
             reach *= 0.4
-        sigmas[name] = _width(points, gains)
+        sigmas[name] = shape_sigma(points, gains)
     plain = plain_form(effect)
     if plain is not None and gain(shapes) - gain(plain.shapes) <= ALIKE_NATS * max(model.fit.misfit, 1.0):
         shapes = dict(plain.shapes)
     return replace(accepted, free=replace(accepted.free, shapes=shapes)), sigmas
 
 
-def _width(points: Floats, gains: Floats) -> float:
-    """Sigma of a shape from the parabola through the gains about the best one; nan where they have no top."""
-    near = gains > gains.max() - 12.0
-    if near.sum() < 3:
-        return float(np.ptp(points[np.argsort(gains)[-2:]]))
-    curvature = float(np.polyfit(points[near] - points[int(np.argmax(gains))], gains[near], 2)[0])
-    return 1.0 / float(np.sqrt(-2.0 * curvature)) if curvature < 0.0 else float("nan")
+def shape_sigma(points: Floats, gains: Floats) -> float:
+    """Sigma of a shape from the parabola through the gains (n,) about the best of some points (n,), sorted.
+
+    Where too few lie near the top, from how far it falls to its neighbours, the flatter side: at d from the top a
+    parabola has fallen by d²/2σ². nan where the gains have no top.
+    """
+    best = int(np.argmax(gains))
+    near = gains > gains[best] - 12.0
+    if near.sum() >= 3:
+        curvature = float(np.polyfit(points[near] - points[best], gains[near], 2)[0])
+        return 1.0 / float(np.sqrt(-2.0 * curvature)) if curvature < 0.0 else float("nan")
+    beside = [k for k in (best - 1, best + 1) if 0 <= k < points.size and np.isfinite(gains[k])]
+    falls = [abs(points[k] - points[best]) / np.sqrt(2.0 * max(gains[best] - gains[k], 1e-9)) for k in beside]
+    return float(max(falls, default=float("nan")))
 
 
 def _without(model: Model, run: int, accepted: Accepted) -> Scan:

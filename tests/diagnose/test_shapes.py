@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sccal.diagnose.criteria import LEAST_NATS, SEARCH_T
-from sccal.diagnose.shapes import Found, find_moments
+from sccal.diagnose.shapes import Found, find_moments, shape_sigma
 from sccal.effects.catalogue import CATALOGUE
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, refitted
@@ -79,3 +79,21 @@ def test_what_is_known_already_is_not_looked_for():
 def test_beside_an_effect_that_is_in_the_model_nothing_stands_out():
     model = refitted(bare("lever_arm=0.3,-0.1"), [Accepted(Free(CATALOGUE["lever_arm"]))])
     assert find_moments(model, 0, ()) == []
+
+
+# How well a shape is known
+
+
+@pytest.mark.parametrize("sigma", [0.05, 0.4, 3.0, 20.0])
+@pytest.mark.parametrize("top", [0.0, 8.0])
+def test_the_sigma_of_a_shape_is_that_of_the_parabola_however_coarse_the_points(top, sigma):
+    """With points far further apart than the sigma, and with the top at the first of them."""
+    points = top + np.array([0.0, 1.0, 2.0, 5.0, 9.0])
+    if top > 0.0:
+        points = np.unique([*points, *(top - points[1:] + top)])
+    gains = -0.5 * ((points - top) / sigma) ** 2
+    assert shape_sigma(points, gains) == pytest.approx(sigma, rel=1e-6)
+
+
+def test_a_shape_without_a_top_has_no_sigma():
+    assert np.isnan(shape_sigma(np.array([1.0, 2.0, 3.0]), np.array([0.0, -1.0, 0.0])))
