@@ -1,4 +1,4 @@
-"""Draw the building by the rooms in the package's docstring: ``python docs/architecture.py > docs/architecture.svg``."""
+"""Draw the building by the rooms in the package's docstring: ``docs/architecture.py > docs/architecture.svg``."""
 
 from __future__ import annotations
 
