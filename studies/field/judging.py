@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,7 @@ def judge(case: FieldCase, folder: Path) -> Mark:
     """Write the log, call the commands, and compare."""
     log, out = folder / "log", folder / "out"
     truth = case.build(log)
-    said = run_command(["calibrate", str(log), "--out", str(out), "--jobs", "1", *case.options])
+    said = _run(["calibrate", str(log), "--out", str(out), "--jobs", "1", *case.options], folder)
     told = list(_results(out)) if said.code != 2 else []
     scores = _scores(told, truth)
     faults = [f"{name} estimated {score:+.1f}σ off" for name, score in scores.items() if abs(score) > WRONG_SIGMAS]
@@ -68,6 +68,12 @@ def judge(case: FieldCase, folder: Path) -> Mark:
     if case.diagnosis is not None:
         faults += _diagnose(case.diagnosis, case, truth, log, folder / "diagnosed")
     return Mark(not faults, taken, _got(said, told), scores, tuple(faults))
+
+
+def _run(arguments: list[str], folder: Path) -> Said:
+    """A command; the names of the folders above the log say nothing and are left out of its text."""
+    said = run_command(arguments)
+    return replace(said, text=said.text.replace(str(folder), ""), last=said.last.replace(str(folder), ""))
 
 
 def _results(out: Path) -> Iterator[Told]:
@@ -153,7 +159,7 @@ def _ask(asked: Asked, case: FieldCase, log: Path, out: Path) -> list[str]:
     results = sorted(out.rglob("calibration.json"))
     stands = {"RUN": str(log), "OUT": str(results[0].parent if results else out)}
     options = case.options if asked.command[0] in ("inspect", "diagnose") else ()
-    said = run_command([*(stands.get(word, word) for word in asked.command), *options])
+    said = _run([*(stands.get(word, word) for word in asked.command), *options], log.parent)
     command = asked.command[0]
     faults = [f"{command} exit {said.code}: {said.last[:120]}"] if said.code not in asked.exits else []
     faults += [f"{command} does not say /{pattern}/" for pattern in asked.says if not said.has(pattern)]
@@ -162,7 +168,7 @@ def _ask(asked: Asked, case: FieldCase, log: Path, out: Path) -> list[str]:
 
 def _diagnose(wanted: Diagnosis, case: FieldCase, truth: Truth, log: Path, out: Path) -> list[str]:
     """Faults of a diagnosis."""
-    said = run_command(["diagnose", str(log), "--out", str(out), *case.options])
+    said = _run(["diagnose", str(log), "--out", str(out), *case.options], log.parent)
     path = out / "diagnosis.json"
     if said.code or not path.exists():
         accepted = any(said.has(pattern) for pattern in wanted.or_says)

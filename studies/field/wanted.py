@@ -32,10 +32,10 @@ ANY: tuple[float, float] = (float("-inf"), float("inf"))
 """A value that cannot be told from the log, or has no single truth."""
 
 SIGMAS: Mapping[str, float] = {
-    "radius_right_m": 0.0025,
-    "radius_left_m": 0.0025,
-    "track_m": 0.006,
-    "heading_offset_deg": 0.7,
+    "radius_right_m": 0.0022,
+    "radius_left_m": 0.0022,
+    "track_m": 0.0045,
+    "heading_offset_deg": 0.55,
 }
 """Sigmas that are expected of a clear log, at most: shares of radii and track, degrees. About three times what a clean
 drive of three minutes gives."""
