@@ -171,9 +171,7 @@ def in_order(first: Iterable[Message], second: Iterable[Message]) -> list[Messag
 
 def sentence_messages(log: Log, topic: str = "/nmea") -> list[Message]:
     """The receiver's sentences as strings."""
-    return [
-        (nanoseconds(t), topic, "std_msgs/msg/String", {"data": text + "\r\n"}) for t, text in nmea_lines(log)
-    ]
+    return [(nanoseconds(t), topic, "std_msgs/msg/String", {"data": text + "\r\n"}) for t, text in nmea_lines(log)]
 
 
 def write_mcap(path: Path, found: Iterable[Message], **settings: Any) -> None:

@@ -30,6 +30,11 @@ class Told:
     parameters: Mapping[str, Mapping[str, Any]]
 
     @property
+    def is_run(self) -> bool:
+        """Whether this is a run's result; else it is the vehicle's, whose verdict counts where there are several runs."""
+        return self.run.endswith("calibration.json")
+
+    @property
     def level(self) -> str:
         """The verdict's first word."""
         return self.verdict.split(":")[0].split(" ")[0].strip().lower()
@@ -126,9 +131,10 @@ def _miss(way: Way, said: Said, told: list[Told], scores: Mapping[str, float]) -
     unsaid = [pattern for pattern in way.says if not said.has(pattern)]
     if unsaid:
         return f"does not say /{unsaid[0]}/"
-    if way.levels and (not told or any(one.level not in way.levels for one in told)):
-        return f"verdict {', '.join(sorted({one.level for one in told})) or 'missing'}"
-    runs = sum(one.run.endswith("calibration.json") for one in told)
+    runs = sum(one.is_run for one in told)
+    levels = {one.level for one in told if one.is_run == (runs == 1)}
+    if way.levels and (not levels or levels - set(way.levels)):
+        return f"verdict {', '.join(sorted(levels)) or 'missing'}"
     if way.runs is not None and runs != way.runs:
         return f"{runs} runs"
     for name in way.estimated:
@@ -214,5 +220,6 @@ def _finding_faults(finding: Mapping[str, Any], truth: Truth) -> list[str]:
 def _got(said: Said, told: list[Told]) -> str:
     """A short text of what calibrate said."""
     if told and not said.code:
-        return f"{said.code} {told[0].verdict}"
+        runs = sum(one.is_run for one in told)
+        return f"{said.code} {next(one.verdict for one in told if one.is_run == (runs == 1))}"
     return f"{said.code} {said.last}"

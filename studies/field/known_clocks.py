@@ -8,9 +8,8 @@ from pathlib import Path
 
 from studies.field.drives import varied
 from studies.field.files import (
-    Line,
     bare,
-    body_of,
+    encoder_rows,
     nmea_lines,
     resaid,
     stamped,
@@ -21,7 +20,6 @@ from studies.field.files import (
     write_run,
     write_table,
     write_vehicle,
-    encoder_rows,
 )
 from studies.field.wanted import Chapter, Diagnosis, Truth, inspected, refused, right
 from studies.field.world import START_S, Log, moved, record
@@ -53,7 +51,9 @@ def late(seconds: float = 0.25) -> Log:
     return moved(base(), seconds)
 
 
-def received(form: Callable[[int, float, str], str], head: Sequence[str] = (), end: str = "\r\n") -> Callable[[Path], Truth]:
+def received(
+    form: Callable[[int, float, str], str], head: Sequence[str] = (), end: str = "\r\n"
+) -> Callable[[Path], Truth]:
     """A log whose receive times have some form: of number, Unix seconds and sentence."""
 
     def build(folder: Path) -> Truth:
@@ -134,11 +134,16 @@ def before(t: float, until_s: float, back_s: float) -> float:
 
 GOES_BACK = r"(goes? back|wraps?|wrapped|starts? again|midnight|set back|jump|step)"
 JUMPS.add(
-    "clock-from-1970", retimed(lambda t: before(t, 45.0, START_S - 12.0)), right(2.5, ("good", "doubtful")),
+    "clock-from-1970",
+    retimed(lambda t: before(t, 45.0, START_S - 12.0)),
+    right(2.5, ("good", "doubtful")),
     asked=(inspected(),),
 )
 JUMPS.add(
-    "clock-3-days", retimed(lambda t: before(t, 40.0, 3 * 86400.0)), right(2.5, ("good", "doubtful")), asked=(inspected(),)
+    "clock-3-days",
+    retimed(lambda t: before(t, 40.0, 3 * 86400.0)),
+    right(2.5, ("good", "doubtful")),
+    asked=(inspected(),),
 )
 JUMPS.add(
     "clock-us-wrap",
@@ -154,8 +159,14 @@ JUMPS.add(
     refused(GOES_BACK),
     never=("do not overlap",),
 )
-JUMPS.add("clock-summer-time", retimed(lambda t: t + (3600.0 if t - START_S > 80.0 else 0.0)), right(2.5, ("good", "doubtful")))
-JUMPS.add("clock-step-5s", retimed(lambda t: t + (5.0 if t - START_S > 80.0 else 0.0)), right(2.5, ("good", "doubtful")))
+JUMPS.add(
+    "clock-summer-time",
+    retimed(lambda t: t + (3600.0 if t - START_S > 80.0 else 0.0)),
+    right(2.5, ("good", "doubtful")),
+)
+JUMPS.add(
+    "clock-step-5s", retimed(lambda t: t + (5.0 if t - START_S > 80.0 else 0.0)), right(2.5, ("good", "doubtful"))
+)
 
 
 @STAMPS.case("polled-100hz", right(1.5), never=(r"\b100 rows/s",))
@@ -201,7 +212,9 @@ def bursts(folder: Path) -> Truth:
     log = base()
     write_run(folder, log)
     rows = encoder_rows(log)
-    write_table(folder / "encoder.csv", ["t", "left_ticks", "right_ticks"], [[burst(row[0], 0.1), *row[1:]] for row in rows])
+    write_table(
+        folder / "encoder.csv", ["t", "left_ticks", "right_ticks"], [[burst(row[0], 0.1), *row[1:]] for row in rows]
+    )
     return Truth.of(log)
 
 

@@ -206,14 +206,20 @@ def in_degrees(_number: int, ns: int, left_rad: float, right_rad: float) -> Told
 
 DEGREES = r"(degrees? instead|in degrees|57\.\d|degrees, not radians)"
 TYPES.add(
-    "message-joints-degrees", one_mcap(lambda: messages(base(), wheels=in_degrees)), right(1.3), doubted(DEGREES), refused(DEGREES)
+    "message-joints-degrees",
+    one_mcap(lambda: messages(base(), wheels=in_degrees)),
+    right(1.3),
+    doubted(DEGREES),
+    refused(DEGREES),
 )
 
 
 def zeros_between(number: int, ns: int, yaw_rad: float) -> Told:
     """An AHRS whose quaternion is all zero now and then."""
     zero = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
-    return [("/imu/data", "sensor_msgs/msg/Imu", imu(ns, zero if number % 40 == 7 or number < 60 else quaternion(yaw_rad)))]
+    return [
+        ("/imu/data", "sensor_msgs/msg/Imu", imu(ns, zero if number % 40 == 7 or number < 60 else quaternion(yaw_rad)))
+    ]
 
 
 TYPES.add("message-quaternion-zeros", one_mcap(lambda: messages(base(), heading=zeros_between)), right(1.3))

@@ -5,17 +5,15 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from studies.arrays import FloatArray, stream
+from studies.arrays import stream
 from studies.earth import clock_text, sentence
 from studies.field.files import (
     Line,
     body_of,
-    epochs,
     heading_of,
     nmea_lines,
     resaid,
@@ -100,11 +98,7 @@ SENTENCES.add(
 )
 SENTENCES.add(
     "rmc-void-1980",
-    said(
-        lambda lines: [
-            f"{t:.4f} " + (resaid(text, void) if t - START_S < 20.0 else text) for t, text in lines
-        ]
-    ),
+    said(lambda lines: [f"{t:.4f} " + (resaid(text, void) if t - START_S < 20.0 else text) for t, text in lines]),
     right(1.5),
 )
 
@@ -277,16 +271,3 @@ def autopilot(folder: Path) -> Truth:
     write_vehicle(folder, base())
     (folder / "flight.bin").write_bytes(b"\xa3\x95\x80\x80\x59FMT\x00BBnNZ" + bytes(range(256)) * 40)
     return Truth.of(base())
-
-
-def shifted_epochs(log: Log, seconds: float) -> Log:
-    """The receiver's epochs moved, and nothing else."""
-    return replace(log, fix_t=log.fix_t + seconds)
-
-
-def texts(values: FloatArray, digits: int) -> list[str]:
-    """Numbers as text."""
-    return [f"{value:.{digits}f}" for value in values.tolist()]
-
-
-__all__ = ["CHAPTERS", "epochs"]

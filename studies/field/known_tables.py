@@ -14,7 +14,6 @@ from studies.field.files import (
     ahrs_rows,
     encoder_head,
     encoder_rows,
-    fix_row,
     nmea_lines,
     resaid,
     stamped,
@@ -26,7 +25,7 @@ from studies.field.files import (
     write_table,
 )
 from studies.field.known_clocks import base
-from studies.field.wanted import ANY_LEVEL, NOT_GOOD, Chapter, Truth, Way, doubted, honest, inspected, refused, right
+from studies.field.wanted import ANY_LEVEL, Chapter, Truth, doubted, inspected, refused, right
 from studies.field.world import Log
 
 QUALITY = Chapter("known", "quality codes")
@@ -37,7 +36,7 @@ NUMBERS = Chapter("known", "coordinates in tables")
 CHAPTERS = (QUALITY, TABLES, COUNTS, YAW, NUMBERS)
 
 CODES = (
-    r"(quality codes?|codes? of (the )?quality|fix_quality .{0,80}(not|other|unknown|contradict|scatter|better|worse)|"
+    r"(quality codes?|codes? of (the )?quality|fix_quality [^.;]{0,40}(unknown|contradict|scatter|better|worse|words)|"
     r"RTKLIB|vocabular|RTK_FIXED|in words|(says|called) .{0,60}scatters)"
 )
 
@@ -123,9 +122,7 @@ def tables(
     return build
 
 
-TABLES.add(
-    "csv-decimal-comma", tables(lambda cell: cell.replace(".", ","), ";"), right(1.2), refused(r"decimal comma")
-)
+TABLES.add("csv-decimal-comma", tables(lambda cell: cell.replace(".", ","), ";"), right(1.2), refused(r"decimal comma"))
 TABLES.add("csv-sep-line", tables(comma=";", first="sep=;"), right(1.2))
 TABLES.add("csv-upper", tables(head=lambda top: [name.upper() for name in top]), right(1.2))
 
@@ -245,9 +242,7 @@ def wheel_rates(log: Log) -> list[tuple[float, float]]:
     """Counts a second of the left and the right wheel, since the row before."""
     step_s = float(log.wheel_t[1] - log.wheel_t[0])
     pairs = list(zip(log.left.tolist(), log.right.tolist(), strict=True))
-    return [
-        ((b[0] - a[0]) / step_s, (b[1] - a[1]) / step_s) for a, b in zip(pairs[:-1], pairs[1:], strict=True)
-    ]
+    return [((b[0] - a[0]) / step_s, (b[1] - a[1]) / step_s) for a, b in zip(pairs[:-1], pairs[1:], strict=True)]
 
 
 def yaws(head: Row, row: Callable[[int, Row], Row]) -> Callable[[Path], Truth]:
@@ -270,7 +265,9 @@ def zeroed(share: float) -> Callable[[int, Row], Row]:
 
 ZEROS = r"(exactly 0|0\.00|zeros?\b)"
 SHIFTED = ("shifted in time, or frozen", "do not turn together")
-YAW.add("yaw-zeros-2pc", yaws(["t", "yaw_deg"], zeroed(0.02)), right(1.3), right(1.3, ANY_LEVEL, (ZEROS,)), never=SHIFTED)
+YAW.add(
+    "yaw-zeros-2pc", yaws(["t", "yaw_deg"], zeroed(0.02)), right(1.3), right(1.3, ANY_LEVEL, (ZEROS,)), never=SHIFTED
+)
 YAW.add("yaw-zeros-10pc", yaws(["t", "yaw_deg"], zeroed(0.1)), right(2.0, ANY_LEVEL), refused(ZEROS), never=SHIFTED)
 
 HUNDREDTHS = r"(hundred|centi|0\.01|1/100|× ?100|factor of (about )?(100|9\d|10\d)|100 times)"
@@ -290,15 +287,15 @@ YAW.add(
 )
 
 
-def placed(row: Callable[[float, float], Row], head: tuple[str, str] = ("lat_deg", "lon_deg")) -> Callable[[Path], Truth]:
+def placed(
+    row: Callable[[float, float], Row], head: tuple[str, str] = ("lat_deg", "lon_deg")
+) -> Callable[[Path], Truth]:
     """A gnss.csv with the two coordinates in another notation."""
 
     def build(folder: Path) -> Truth:
         log = base()
         without_fixes(folder, log)
-        write_fixes(
-            folder, ["t", *head, "fix_quality"], lambda k, t, lat, lon: [f"{t:.4f}", *row(lat, lon), "4"], log
-        )
+        write_fixes(folder, ["t", *head, "fix_quality"], lambda k, t, lat, lon: [f"{t:.4f}", *row(lat, lon), "4"], log)
         return Truth.of(log)
 
     return build
@@ -312,14 +309,18 @@ def ddmm(angle_deg: float) -> str:
 
 MIRRORED = r"(exchang|swap|latitude .{0,80}longitude|sign of the longitude|mirror)"
 MINUTES = r"(minutes|ddmm|NMEA notation)"
-NUMBERS.add("places-exchanged", placed(lambda lat, lon: [f"{lon:.9f}", f"{lat:.9f}"]), refused(MIRRORED), doubted(MIRRORED))
+NUMBERS.add(
+    "places-exchanged", placed(lambda lat, lon: [f"{lon:.9f}", f"{lat:.9f}"]), refused(MIRRORED), doubted(MIRRORED)
+)
 NUMBERS.add(
     "places-1e7",
     placed(lambda lat, lon: [str(round(lat * 1e7)), str(round(lon * 1e7))]),
     right(1.5),
     refused(r"(1e-?7|10⁷|10\^7|10 ?000 ?000|ten million|scale|integers)"),
 )
-NUMBERS.add("places-ddmm", placed(lambda lat, lon: [ddmm(lat), ddmm(lon)]), right(1.5), refused(MINUTES), doubted(MINUTES))
+NUMBERS.add(
+    "places-ddmm", placed(lambda lat, lon: [ddmm(lat), ddmm(lon)]), right(1.5), refused(MINUTES), doubted(MINUTES)
+)
 
 
 @NUMBERS.case(
@@ -342,11 +343,3 @@ def metres(folder: Path) -> Truth:
     halves = [[t, f"{math.sin(math.radians(float(yaw)) / 2.0):.5f}"] for t, yaw in ahrs_rows(log)]
     write_table(folder / "ahrs.csv", ["t", "yaw_deg"], halves)
     return Truth.of(log)
-
-
-def said_plainly(*says: str) -> Way:
-    """The right numbers under any verdict, where the matter is named."""
-    return Way("right, told", (0,), NOT_GOOD, says)
-
-
-__all__ = ["CHAPTERS", "fix_row", "honest"]

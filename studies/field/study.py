@@ -72,7 +72,16 @@ def _row(outcome: Outcome[str, Mark]) -> list[str]:
         return [case.name, case.part, case.kind, wanted, "", "", "not ok", outcome.error.splitlines()[-1]]
     numbers = " ".join(f"{SHORT[name]} {mark.scores[name]:+.1f}" for name in SIGMAS if name in mark.scores)
     ok = "ok" if mark.ok else "not ok"
-    return [case.name, case.part, case.kind, wanted, _cut(mark.got, 140), numbers, ok, _cut("; ".join(mark.faults), 400)]
+    return [
+        case.name,
+        case.part,
+        case.kind,
+        wanted,
+        _cut(mark.got, 140),
+        numbers,
+        ok,
+        _cut("; ".join(mark.faults), 400),
+    ]
 
 
 def _cut(text: str, most: int) -> str:

@@ -186,6 +186,4 @@ class Chapter:
         options: tuple[str, ...] = (),
     ) -> None:
         """The same for functions that are made on the way."""
-        self.cases.append(
-            FieldCase(name, self.part, self.kind, build, ways, never, diagnosis, asked, options)
-        )
+        self.cases.append(FieldCase(name, self.part, self.kind, build, ways, never, diagnosis, asked, options))

@@ -197,7 +197,20 @@ def sense(motion: Motion, seed: int, robot: Robot, told: Instruments | None = No
     received = fix_t + told.delay_s + told.jitter_s * stream(seed, "field jitter").random(fix_t.size)
     quality = np.full(fix_t.size, told.quality, dtype=np.int64)
     return Log(
-        seed, robot, motion, wheel_t, left, right, yaw_t, yaw_deg, fix_t, received, east, north, quality, told.offset_deg
+        seed,
+        robot,
+        motion,
+        wheel_t,
+        left,
+        right,
+        yaw_t,
+        yaw_deg,
+        fix_t,
+        received,
+        east,
+        north,
+        quality,
+        told.offset_deg,
     )
 
 
