@@ -8,7 +8,7 @@ FUZZ_SECONDS ?= 60
 .DEFAULT_GOAL := help
 STUDY_OUT ?= docs
 
-.PHONY: help run test lint bench fuzz study-noise study-effects study-parking samples clean
+.PHONY: help run test lint bench fuzz study-noise study-effects study-parking study-field samples clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -39,6 +39,9 @@ study-effects: $(VENV)/.ready-dev ## every effect alone, and 60 pairs and triple
 
 study-parking: $(VENV)/.ready-dev ## a robot that parks for up to an hour: the same constants
 	$(BIN)/python -m studies parking --out $(STUDY_OUT)/study-parking.md
+
+study-field: $(VENV)/.ready-dev ## logs as people really write them: 300 situations with known truth (40 minutes)
+	$(BIN)/python -m studies field --out $(STUDY_OUT)/study-field.md
 
 samples: $(VENV)/.ready ## make sample_logs/ anew (seeded: the same bytes every time)
 	$(BIN)/sccal simulate --samples sample_logs

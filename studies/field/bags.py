@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.arrays import floats
 from studies.field.files import nmea_lines, write_lines
 from studies.field.world import START_S, Log
 
@@ -44,7 +45,8 @@ DEFINITIONS = {
     + "sensor_msgs/NavSatStatus\nint8 status\nuint16 service\n",
     "std_msgs/msg/String": "string data\n",
     "std_msgs/msg/Float64": "float64 data\n",
-    "ublox_msgs/msg/NavPVT": "uint32 i_tow\nint32 lon\nint32 lat\nint32 height\nuint32 h_acc\nuint8 fix_type\nuint8 flags\n",
+    "ublox_msgs/msg/NavPVT": "uint32 i_tow\nint32 lon\nint32 lat\nint32 height\n"
+    + "uint32 h_acc\nuint8 fix_type\nuint8 flags\n",
     "nav_msgs/msg/Odometry": _TOP
     + "string child_frame_id\ngeometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"
     + _HEADER
@@ -180,7 +182,8 @@ def write_mcap(path: Path, found: Iterable[Message], **settings: Any) -> None:
 
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("wb") as file:
-        writer, schemas = Writer(file, **settings), {}
+        writer: Any = Writer(file, **settings)
+        schemas: dict[str, Any] = {}
         for ns, topic, kind, values in found:
             if kind not in schemas:
                 schemas[kind] = writer.register_msgdef(kind, DEFINITIONS[kind])
@@ -215,23 +218,24 @@ def _objects(store: Any, kind: str, values: Values, with_seq: bool) -> Any:
     stamp = types["builtin_interfaces/msg/Time"](**values["header"]["stamp"])
     seq = {"seq": 0} if with_seq else {}
     head = types["std_msgs/msg/Header"](**seq, stamp=stamp, frame_id=values["header"]["frame_id"])
-    array = lambda numbers: np.array(numbers, dtype=np.float64)  # noqa: E731
     if kind.endswith("JointState"):
-        return types[kind](head, values["name"], *(array(values[key]) for key in ("position", "velocity", "effort")))
+        return types[kind](head, values["name"], *(floats(values[key]) for key in ("position", "velocity", "effort")))
     if kind.endswith("Imu"):
         three, four = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
         return types[kind](
             head,
             four(**values["orientation"]),
-            array(NOTHING9),
+            floats(NOTHING9),
             three(**values["angular_velocity"]),
-            array(NOTHING9),
+            floats(NOTHING9),
             three(**values["linear_acceleration"]),
-            array(NOTHING9),
+            floats(NOTHING9),
         )
     status = types["sensor_msgs/msg/NavSatStatus"](**values["status"])
     numbers = (values[key] for key in ("latitude", "longitude", "altitude"))
-    return types[kind](head, status, *numbers, array(values["position_covariance"]), values["position_covariance_type"])
+    return types[kind](
+        head, status, *numbers, floats(values["position_covariance"]), values["position_covariance_type"]
+    )
 
 
 def write_ros1(path: Path, found: Iterable[Message], **settings: Any) -> None:
@@ -241,7 +245,7 @@ def write_ros1(path: Path, found: Iterable[Message], **settings: Any) -> None:
 
     store = get_typestore(Stores.ROS1_NOETIC)
     path.parent.mkdir(parents=True, exist_ok=True)
-    writer = Writer(path)
+    writer: Any = Writer(path)
     if "compression" in settings:
         writer.set_compression(settings["compression"])
     with writer:

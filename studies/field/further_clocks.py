@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from studies.field.drives import headlands, road, rows
@@ -17,7 +18,6 @@ from studies.field.files import (
     encoder_head,
     encoder_rows,
     fix_row,
-    heading_of,
     nmea_lines,
     stamped,
     utc,
@@ -34,7 +34,7 @@ from studies.field.further_robots import Bend, Drawn, case_of
 from studies.field.known_clocks import GOES_BACK, NOT_THROWN_AWAY, before, burst, iso, whole, write_polled
 from studies.field.known_wheels import CAR, TRACTOR
 from studies.field.wanted import ANY_LEVEL, Chapter, Diagnosis, Truth, honest, inspected, refused, right
-from studies.field.world import START_S, Ground, Instruments, Log, moved, record
+from studies.field.world import START_S, Ground, Log, moved, record
 
 CONTROLS = Chapter("further", "controls")
 FORMS = Chapter("further", "receive times")
@@ -141,9 +141,7 @@ OTHER_FORMS: dict[str, Callable[[int, float, str], str]] = {
 for number, (name, form) in enumerate(OTHER_FORMS.items()):
     end = "\n" if "echo" in name else "\r\n"
     FORMS.add(name, case_of(2100 + number, received(form, end=end)), PRECISE, never=NOT_THROWN_AWAY)
-FORMS.add(
-    "receive-10-digits", case_of(2120, received(lambda k, t, s: f"{int(t)} {s}")), right(3.0, ANY_LEVEL)
-)
+FORMS.add("receive-10-digits", case_of(2120, received(lambda k, t, s: f"{int(t)} {s}")), right(3.0, ANY_LEVEL))
 
 
 def since_boot_ms(drawn: Drawn, folder: Path) -> Truth:
@@ -194,7 +192,12 @@ def heading_late(drawn: Drawn, folder: Path) -> Truth:
     return Truth.of(log)
 
 
-HOSTS.add("heading-clock-off", case_of(2205, heading_late), right(2.5, ANY_LEVEL), refused(r"(heading|yaw|AHRS)[^.;]{0,80}(late|shifted by|behind|ahead|\d s)"))
+HOSTS.add(
+    "heading-clock-off",
+    case_of(2205, heading_late),
+    right(2.5, ANY_LEVEL),
+    refused(r"(heading|yaw|AHRS)[^.;]{0,80}(late|shifted by|behind|ahead|\d s)"),
+)
 
 
 def tables_late(drawn: Drawn, folder: Path) -> Truth:
@@ -219,7 +222,10 @@ def retimed(change: Callable[[Drawn, float], float]) -> Bend:
     def bend(drawn: Drawn, folder: Path) -> Truth:
         log = drawn.log()
         write_vehicle(folder, log)
-        clock = lambda t: f"{change(drawn, t):.6f}"  # noqa: E731
+
+        def clock(t: float) -> str:
+            return f"{change(drawn, t):.6f}"
+
         write_encoder(folder, log, clock)
         write_ahrs(folder, log, clock)
         write_lines(folder / "gnss.nmea", [f"{clock(t)} {text}" for t, text in nmea_lines(log)])
@@ -235,7 +241,12 @@ def share(drawn: Drawn) -> float:
 
 LONGER = (right(3.5, ("good", "doubtful")),)
 MILLIS = 4294967.296
-JUMPS.add("clock-400-days", case_of(2300, retimed(lambda d, t: before(t, share(d), 400 * 86400.0))), *LONGER, asked=(inspected(),))
+JUMPS.add(
+    "clock-400-days",
+    case_of(2300, retimed(lambda d, t: before(t, share(d), 400 * 86400.0))),
+    *LONGER,
+    asked=(inspected(),),
+)
 JUMPS.add(
     "clock-20-years-ahead",
     case_of(2301, retimed(lambda d, t: before(t, share(d), -20 * 365.25 * 86400.0))),
@@ -256,7 +267,11 @@ JUMPS.add(
     never=("do not overlap",),
 )
 JUMPS.add(
-    "clock-restart", case_of(2306, retimed(lambda d, t: t - START_S if t - START_S < share(d) else t - START_S - share(d))), *LONGER, refused(GOES_BACK), never=("do not overlap",)
+    "clock-restart",
+    case_of(2306, retimed(lambda d, t: t - START_S if t - START_S < share(d) else t - START_S - share(d))),
+    *LONGER,
+    refused(GOES_BACK),
+    never=("do not overlap",),
 )
 
 
@@ -299,7 +314,7 @@ def polled_all(drawn: Drawn, log: Log, folder: Path) -> None:
     """Each line of the receiver is written again until a newer one comes."""
     lines: list[Line] = [(t, text) for t, text in nmea_lines(log) if "GGA" in text]
     again = []
-    for (t, text), (next_t, _) in zip(lines[:-1], lines[1:], strict=True):
+    for (t, text), (next_t, _) in pairwise(lines):
         again += [(t + 0.02 * number, text) for number in range(max(1, int((next_t - t) / 0.02)))]
     write_lines(folder / "gnss.nmea", stamped(again))
 
@@ -316,5 +331,3 @@ STAMPS.add(
 STAMPS.add("epochs-whole-seconds", case_of(2402, bent_stamps(whole_second_epochs)), *CLEAR, never=("two receivers",))
 STAMPS.add("polled-odd-rate", case_of(2403, bent_stamps(polled)), *JITTERED)
 STAMPS.add("polled-sentences", case_of(2404, bent_stamps(polled_all)), *CLEAR)
-
-__all__ = ["CHAPTERS", "heading_of"]

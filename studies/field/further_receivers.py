@@ -5,8 +5,6 @@ from __future__ import annotations
 import bz2
 import gzip
 import json
-import math
-import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -24,8 +22,6 @@ from studies.field.bags import (
     messages,
     nothing,
     quaternion,
-    sentence_messages,
-    usual_wheels,
     vector,
     write_db3,
     write_mcap,
@@ -45,10 +41,10 @@ from studies.field.files import (
     write_run,
     write_vehicle,
 )
-from studies.field.further_robots import Bend, Drawn, case_of, draw
-from studies.field.known_sentences import crc32, gpsd_reports, week
-from studies.field.wanted import ANY_LEVEL, Chapter, Truth, honest, inspected, refused, right
-from studies.field.world import ORIGIN, START_S, Instruments, Log
+from studies.field.further_robots import Bend, Drawn, case_of
+from studies.field.known_sentences import POS_REST, crc32, gpsd_reports, week
+from studies.field.wanted import ANY_LEVEL, Chapter, Truth, inspected, refused, right
+from studies.field.world import START_S, Instruments, Log
 
 HEADINGS = Chapter("further", "headings of makers")
 SENTENCES = Chapter("further", "sentences")
@@ -66,7 +62,7 @@ def antennas(drawn: Drawn) -> Instruments:
     return replace(drawn.told, offset_deg=float(drawn.rng.choice([0.0, 90.0, -90.0, 180.0])), yaw_slow=(0.2, 30.0))
 
 
-def said_heading(form: Form, note: str | None = None) -> Bend:
+def said_heading(form: Form) -> Bend:
     """No ahrs.csv; a heading with each fix."""
 
     def bend(drawn: Drawn, folder: Path) -> Truth:
@@ -256,7 +252,7 @@ def pos_sexagesimal(drawn: Drawn, folder: Path) -> Truth:
     """A post-processor's file in UTC, with degrees, minutes and seconds in columns of their own."""
     log = drawn.log()
     without_fixes(folder, log)
-    lines = ["%  UTC   latitude(d'\") longitude(d'\") height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m) age(s) ratio"]
+    lines = [f"%  UTC   latitude(d'\") longitude(d'\") {POS_REST}"]
     latitudes, longitudes = log.places
     for t, lat, lon in zip(log.fix_t.tolist(), latitudes.tolist(), longitudes.tolist(), strict=True):
         when = utc(round(START_S + t, 3)).strftime("%Y/%m/%d %H:%M:%S.%f")[:-3]
@@ -282,7 +278,7 @@ def pos_week(drawn: Drawn, folder: Path) -> Truth:
     """The same with week and seconds, under the name that the receiver's logger gave it."""
     log = drawn.log()
     without_fixes(folder, log)
-    lines = ["%  GPST   latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m) age(s) ratio"]
+    lines = [f"%  GPST   latitude(deg) longitude(deg) {POS_REST}"]
     latitudes, longitudes = log.places
     for t, lat, lon in zip(log.fix_t.tolist(), latitudes.tolist(), longitudes.tolist(), strict=True):
         number, of_week = week(START_S + t)
@@ -331,9 +327,7 @@ def strings_with_headings(drawn: Drawn, folder: Path) -> Truth:
     write_vehicle(folder, log)
     headings = heading_of(log)
     lines = nmea_lines(log, lambda number, _: [sentence(f"GNTHS,{headings[number]:.3f},A")])
-    told = [
-        (round(t * 1e9), "/um982/nmea", "std_msgs/msg/String", {"data": text}) for t, text in lines
-    ]
+    told = [(round(t * 1e9), "/um982/nmea", "std_msgs/msg/String", {"data": text}) for t, text in lines]
     write_mcap(folder / "run.mcap", in_order(messages(log, heading=nothing, fix=nothing), told))
     return Truth.of(log)
 
@@ -566,10 +560,23 @@ def write_no_summary(drawn: Drawn, folder: Path, found: list[Message]) -> None:
 
 BAGS.add("bag-mcap-many-parts", case_of(4410, bag(write_mcap_parts)), right(2.0, runs=1))
 BAGS.add("bag-ros1-parts", case_of(4411, bag(write_bag_parts)), right(2.0, runs=1))
-BAGS.add("bag-mcap-gz", case_of(4412, bag(squeezed("gz", lambda raw: gzip.compress(raw, 1)))), right(2.0), refused(r"(gunzip|\.gz\b|gzip)"))
-BAGS.add("bag-mcap-bz2", case_of(4413, bag(squeezed("bz2", lambda raw: bz2.compress(raw, 1)))), right(2.0), refused(r"(bunzip2|\.bz2\b)"))
+BAGS.add(
+    "bag-mcap-gz",
+    case_of(4412, bag(squeezed("gz", lambda raw: gzip.compress(raw, 1)))),
+    right(2.0),
+    refused(r"(gunzip|\.gz\b|gzip)"),
+)
+BAGS.add(
+    "bag-mcap-bz2",
+    case_of(4413, bag(squeezed("bz2", lambda raw: bz2.compress(raw, 1)))),
+    right(2.0),
+    refused(r"(bunzip2|\.bz2\b)"),
+)
 BAGS.add("bag-ros1-bz2-chunks", case_of(4414, bag(write_bz2_bag)), right(2.0))
-BAGS.add("bag-ros1-unindexed", case_of(4415, bag(write_unindexed)), right(2.0, ANY_LEVEL), refused(r"(reindex|not closed|unindexed)"))
+BAGS.add(
+    "bag-ros1-unindexed",
+    case_of(4415, bag(write_unindexed)),
+    right(2.0, ANY_LEVEL),
+    refused(r"(reindex|not closed|unindexed)"),
+)
 BAGS.add("bag-mcap-no-summary", case_of(4416, bag(write_no_summary)), right(3.0, ANY_LEVEL), refused(r"mcap recover"))
-
-__all__ = ["CHAPTERS", "ORIGIN", "draw", "honest", "math", "sentence_messages", "usual_wheels", "zlib"]

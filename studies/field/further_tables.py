@@ -31,9 +31,20 @@ from studies.field.files import (
 )
 from studies.field.further_robots import Bend, Drawn, case_of
 from studies.field.known_headings import FROZEN
-from studies.field.known_tables import CODES, INCREMENTS, MIRRORED, ONE_WHEEL, UNIT, ZEROS, unaided, wandering, wheel_rates
+from studies.field.known_tables import (
+    CODES,
+    INCREMENTS,
+    MIRRORED,
+    ONE_WHEEL,
+    UNIT,
+    ZEROS,
+    unaided,
+    wandering,
+    wheel_rates,
+)
 from studies.field.wanted import ANY_LEVEL, Chapter, Diagnosis, Truth, doubted, honest, refused, right
 from studies.field.world import START_S, Log, record
+from studies.vehicles import Robot
 
 QUALITY = Chapter("further", "quality codes")
 HONEST = Chapter("further", "honest logs")
@@ -88,9 +99,7 @@ def always_float(drawn: Drawn, folder: Path) -> Truth:
 
 def replaced_noise(drawn: Drawn, white_m: float, slow_m: float, slow_s: float, quality: int) -> Log:
     """The drawn log with other errors of the fixes."""
-    return drawn.log(
-        told=replace(drawn.told, fix_white_m=white_m, fix_slow=(slow_m, slow_s), quality=quality)
-    )
+    return drawn.log(told=replace(drawn.told, fix_white_m=white_m, fix_slow=(slow_m, slow_s), quality=quality))
 
 
 def float_in_turns(drawn: Drawn, folder: Path) -> Truth:
@@ -111,26 +120,21 @@ def float_in_turns(drawn: Drawn, folder: Path) -> Truth:
 
 
 HONEST.add("float-always", case_of(3100, always_float, 240.0), honest(), diagnosis=Diagnosis(nothing=True))
-HONEST.add("float-in-turns", case_of(3101, float_in_turns, 240.0), right(2.5, ANY_LEVEL), diagnosis=Diagnosis(nothing=True))
+HONEST.add(
+    "float-in-turns", case_of(3101, float_in_turns, 240.0), right(2.5, ANY_LEVEL), diagnosis=Diagnosis(nothing=True)
+)
 
 
 def coarse(ticks: int, speed: float) -> Callable[[Path], Truth]:
     """Few counts in a turn, and a slow robot."""
 
     def build(folder: Path) -> Truth:
-        drawn_robot = replace(record_robot(), ticks_per_rev=ticks)
+        drawn_robot = Robot(0.0655, 0.0648, 0.31, 0.065, 0.30, ticks)
         log = record(varied(240.0, 3102, speed, 0.3), 3102, drawn_robot)
         write_run(folder, log)
         return Truth.of(log)
 
     return build
-
-
-def record_robot():  # type: ignore[no-untyped-def]
-    """A small rover."""
-    from studies.vehicles import Robot
-
-    return Robot(0.0655, 0.0648, 0.31, 0.065, 0.30, 36)
 
 
 HONEST.add("coarse-36-slow", coarse(36, 0.16), honest(), diagnosis=Diagnosis(nothing=True))
@@ -165,14 +169,6 @@ def dialect(
 
 
 DECIMAL = lambda cell: cell.replace(".", ",")  # noqa: E731
-TABLES.add("table-comma-tab-quoted", case_of(3200, dialect("\t", DECIMAL, quoted=True)), right(2.0), refused(r"decimal comma"))
-TABLES.add("table-utf16", case_of(3201, dialect(bom="utf-16")), right(2.0), refused(r"UTF-?16"))
-TABLES.add(
-    "table-sep-tab-comma",
-    case_of(3202, lambda drawn, folder: with_first_line(drawn, folder)),
-    right(2.0),
-    refused(r"decimal comma"),
-)
 
 
 def with_first_line(drawn: Drawn, folder: Path) -> Truth:
@@ -182,6 +178,18 @@ def with_first_line(drawn: Drawn, folder: Path) -> Truth:
         path = folder / name
         path.write_bytes(b"sep=;\r\n" + path.read_bytes())
     return truth
+
+
+TABLES.add(
+    "table-comma-tab-quoted", case_of(3200, dialect("\t", DECIMAL, quoted=True)), right(2.0), refused(r"decimal comma")
+)
+TABLES.add("table-utf16", case_of(3201, dialect(bom="utf-16")), right(2.0), refused(r"UTF-?16"))
+TABLES.add(
+    "table-sep-tab-comma",
+    case_of(3202, with_first_line),
+    right(2.0),
+    refused(r"decimal comma"),
+)
 
 
 def clock_times(form: str) -> Bend:
@@ -209,14 +217,15 @@ def milliseconds(name: str) -> Bend:
     def bend(drawn: Drawn, folder: Path) -> Truth:
         log = drawn.log()
         write_run(folder, log)
-        clock = lambda t: str(round((t - START_S) * 1000.0))  # noqa: E731
+
+        def clock(t: float) -> str:
+            return str(round((t - START_S) * 1000.0))
+
         write_table(folder / "encoder.csv", [name, *encoder_head(log)[1:]], encoder_rows(log, clock))
         write_table(folder / "ahrs.csv", [name, *ahrs_head(log)[1:]], ahrs_rows(log, clock))
         (folder / "gnss.nmea").unlink()
         plain = fix_row(log)
-        write_fixes(
-            folder, [name, *FIX_HEAD[1:]], lambda k, t, lat, lon: [clock(t), *plain(k, t, lat, lon)[1:]], log
-        )
+        write_fixes(folder, [name, *FIX_HEAD[1:]], lambda k, t, lat, lon: [clock(t), *plain(k, t, lat, lon)[1:]], log)
         return Truth.of(log)
 
     return bend
@@ -237,7 +246,12 @@ def long_form(drawn: Drawn, folder: Path) -> Truth:
     return Truth.of(log)
 
 
-TABLES.add("table-wheel-per-row", case_of(3207, long_form), right(2.0), refused(r"(one wheel|wheel.{0,40}(row|column)|t,wheel,ticks)"))
+TABLES.add(
+    "table-wheel-per-row",
+    case_of(3207, long_form),
+    right(2.0),
+    refused(r"(one wheel|wheel.{0,40}(row|column)|t,wheel,ticks)"),
+)
 
 
 def alternating(drawn: Drawn, folder: Path) -> Truth:
@@ -284,19 +298,30 @@ def per_count(log: Log) -> tuple[float, float]:
 RATES = r"(speeds?|rates?|radps|rad/s|velocit|mm/s|m/s|mmps)"
 TABLES.add(
     "wheels-radps",
-    case_of(3209, wheel_column(["t", "left_radps", "right_radps"], lambda d, log, w: [f"{x * per_count(log)[0]:.5f}" for x in w])),
+    case_of(
+        3209,
+        wheel_column(["t", "left_radps", "right_radps"], lambda d, log, w: [f"{x * per_count(log)[0]:.5f}" for x in w]),
+    ),
     right(4.0, ANY_LEVEL),
     refused(RATES),
 )
 TABLES.add(
     "wheels-mmps",
-    case_of(3210, wheel_column(["t", "left_mmps", "right_mmps"], lambda d, log, w: [f"{x * per_count(log)[1] * 1e3:.2f}" for x in w])),
+    case_of(
+        3210,
+        wheel_column(
+            ["t", "left_mmps", "right_mmps"], lambda d, log, w: [f"{x * per_count(log)[1] * 1e3:.2f}" for x in w]
+        ),
+    ),
     right(4.0, ANY_LEVEL),
     refused(RATES),
 )
 TABLES.add(
     "wheels-metres",
-    case_of(3211, wheel_column(["t", "left_m", "right_m"], lambda d, log, w: [f"{x * per_count(log)[1]:.5f}" for x in w], True)),
+    case_of(
+        3211,
+        wheel_column(["t", "left_m", "right_m"], lambda d, log, w: [f"{x * per_count(log)[1]:.5f}" for x in w], True),
+    ),
     right(2.5),
     refused(r"(left_m|metres|distance)"),
 )
@@ -345,7 +370,9 @@ def named_fixes(head: Row) -> Bend:
 
 
 NAMES.add("names-latitude", case_of(3302, named_fixes(["time", "latitude", "longitude", "quality"])), *NAMED)
-NAMES.add("names-lat-lng", case_of(3303, named_fixes(["t", "lat", "lng", "fix_quality"])), right(2.0), refused(r"\blng\b"))
+NAMES.add(
+    "names-lat-lng", case_of(3303, named_fixes(["t", "lat", "lng", "fix_quality"])), right(2.0), refused(r"\blng\b")
+)
 
 
 def foreign_names(drawn: Drawn, folder: Path) -> Truth:
@@ -393,7 +420,12 @@ def fixes_called(quality: int) -> Bend:
 
 
 NAMES.add("quality-7-manual", case_of(3306, fixes_called(7)), refused(r"(quality 7|manual)"))
-NAMES.add("quality-8-simulator", case_of(3307, fixes_called(8)), refused(r"(quality 8|simulat(or|ed|ion))"), doubted(r"simulat"))
+NAMES.add(
+    "quality-8-simulator",
+    case_of(3307, fixes_called(8)),
+    refused(r"(quality 8|simulat(or|ed|ion))"),
+    doubted(r"simulat"),
+)
 NAMES.add("quality-0-all", case_of(3308, fixes_called(0)), refused(r"(quality 0|no fix|without a fix|invalid)"))
 
 
@@ -422,7 +454,13 @@ for number, (name, head, change) in enumerate(
         ("yaw-16-bit", "yaw_deg", lambda yaw: str(round((yaw % 360.0) * 65536.0 / 360.0) % 65536)),
     )
 ):
-    UNITS.add(name, case_of(3400 + number, yaw_as(head, change)), right(2.0), refused(UNIT), never=(r"shifted in time, or frozen",))
+    UNITS.add(
+        name,
+        case_of(3400 + number, yaw_as(head, change)),
+        right(2.0),
+        refused(UNIT),
+        never=(r"shifted in time, or frozen",),
+    )
 
 
 def with_sentinels(value: str, share: float) -> Bend:
@@ -440,8 +478,12 @@ def with_sentinels(value: str, share: float) -> Bend:
 
 
 TURNS = (r"shifted in time, or frozen", r"do not turn together")
-for number, (name, value, portion) in enumerate((("yaw-minus-1", "-1.00", 0.03), ("yaw-999", "999.90", 0.03), ("yaw-zeros-6pc", "0.00", 0.06))):
-    UNITS.add(name, case_of(3410 + number, with_sentinels(value, portion)), right(2.0, ANY_LEVEL), refused(ZEROS), never=TURNS)
+for number, (name, value, portion) in enumerate(
+    (("yaw-minus-1", "-1.00", 0.03), ("yaw-999", "999.90", 0.03), ("yaw-zeros-6pc", "0.00", 0.06))
+):
+    UNITS.add(
+        name, case_of(3410 + number, with_sentinels(value, portion)), right(2.0, ANY_LEVEL), refused(ZEROS), never=TURNS
+    )
 
 
 def placed(form: Callable[[float, float, float, float], tuple[str, str]]) -> Bend:
@@ -464,15 +506,50 @@ def packed(angle_deg: float) -> str:
     return f"{math.copysign(whole + minutes / 100.0 + rest * 60.0 / 10000.0, angle_deg):.9f}"
 
 
-NOTATION = r"(minutes|seconds of arc|notation|dd\.?mm|sexagesimal|fixes' scale|scale of the fixes|both radii and the track|same (factor|share))"
+NOTATION = (
+    r"(minutes|seconds of arc|notation|dd\.?mm|sexagesimal|fixes' scale|scale of the fixes|"
+    r"both radii and the track|same (factor|share))"
+)
 SCALED = r"(scale|unit|1e-?\d|10\^|10[⁵⁶⁷]|integer|micro|radian|degrees)"
 FAR = r"(far|times as|metres|degrees|latitude|scale|unit|beyond)"
-PLACES.add("place-packed-seconds", case_of(3500, placed(lambda lat, lon, e, n: (packed(lat), packed(lon)))), right(2.0), refused(NOTATION), doubted(NOTATION))
-PLACES.add("place-radians", case_of(3501, placed(lambda lat, lon, e, n: (f"{math.radians(lat):.12f}", f"{math.radians(lon):.12f}"))), right(2.0), refused(r"radian"), doubted(r"radian"))
-PLACES.add("place-microdegrees", case_of(3502, placed(lambda lat, lon, e, n: (str(round(lat * 1e6)), str(round(lon * 1e6))))), right(4.0, ANY_LEVEL), refused(SCALED))
-PLACES.add("place-utm", case_of(3503, placed(lambda lat, lon, e, n: (f"{5249650.0 + n:.3f}", f"{462260.0 + e:.3f}"))), right(2.0), refused(r"(UTM|metres|easting|northing|grid)"))
-PLACES.add("place-south-no-sign", case_of(3504, placed(lambda lat, lon, e, n: (f"{33.9 - (lat - 47.4):.9f}", f"{lon + 143.0:.9f}"))), refused(MIRRORED), doubted(MIRRORED))
-PLACES.add("place-local-metres", case_of(3505, placed(lambda lat, lon, e, n: (f"{n:.4f}", f"{e:.4f}"))), refused(FAR), never=(r"\d{5,} m/s", r"\d\d,\d\d\d m/s"))
+PLACES.add(
+    "place-packed-seconds",
+    case_of(3500, placed(lambda lat, lon, e, n: (packed(lat), packed(lon)))),
+    right(2.0),
+    refused(NOTATION),
+    doubted(NOTATION),
+)
+PLACES.add(
+    "place-radians",
+    case_of(3501, placed(lambda lat, lon, e, n: (f"{math.radians(lat):.12f}", f"{math.radians(lon):.12f}"))),
+    right(2.0),
+    refused(r"radian"),
+    doubted(r"radian"),
+)
+PLACES.add(
+    "place-microdegrees",
+    case_of(3502, placed(lambda lat, lon, e, n: (str(round(lat * 1e6)), str(round(lon * 1e6))))),
+    right(4.0, ANY_LEVEL),
+    refused(SCALED),
+)
+PLACES.add(
+    "place-utm",
+    case_of(3503, placed(lambda lat, lon, e, n: (f"{5249650.0 + n:.3f}", f"{462260.0 + e:.3f}"))),
+    right(2.0),
+    refused(r"(UTM|metres|easting|northing|grid)"),
+)
+PLACES.add(
+    "place-south-no-sign",
+    case_of(3504, placed(lambda lat, lon, e, n: (f"{33.9 - (lat - 47.4):.9f}", f"{lon + 143.0:.9f}"))),
+    refused(MIRRORED),
+    doubted(MIRRORED),
+)
+PLACES.add(
+    "place-local-metres",
+    case_of(3505, placed(lambda lat, lon, e, n: (f"{n:.4f}", f"{e:.4f}"))),
+    refused(FAR),
+    never=(r"\d{5,} m/s", r"\d\d,\d\d\d m/s"),
+)
 
 
 def other_yaw(make: Callable[[Drawn, Log], list[float]]) -> Bend:
@@ -489,9 +566,26 @@ def other_yaw(make: Callable[[Drawn, Log], list[float]]) -> Bend:
     return bend
 
 
-NO_HEADING = r"(no heading|not a heading|do(es)? not (turn|belong|agree|follow)|together|frozen|constant|noise|correlation)"
-NONSENSE.add("nonsense-voltage", case_of(3600, other_yaw(lambda d, log: (24.5 - 0.002 * log.yaw_t + 0.02 * stream(d.seed, "v").standard_normal(log.yaw_t.size)).tolist())), refused(NO_HEADING))
-NONSENSE.add("nonsense-yaw-rate", case_of(3601, other_yaw(lambda d, log: np.degrees(log.motion.at(log.motion.w_radps, log.yaw_t)).tolist())), refused(NO_HEADING))
+NO_HEADING = (
+    r"(no heading|not a heading|do(es)? not (turn|belong|agree|follow)|together|frozen|constant|noise|correlation)"
+)
+NONSENSE.add(
+    "nonsense-voltage",
+    case_of(
+        3600,
+        other_yaw(
+            lambda d, log: (
+                24.5 - 0.002 * log.yaw_t + 0.02 * stream(d.seed, "v").standard_normal(log.yaw_t.size)
+            ).tolist()
+        ),
+    ),
+    refused(NO_HEADING),
+)
+NONSENSE.add(
+    "nonsense-yaw-rate",
+    case_of(3601, other_yaw(lambda d, log: np.degrees(log.motion.at(log.motion.w_radps, log.yaw_t)).tolist())),
+    refused(NO_HEADING),
+)
 NONSENSE.add("nonsense-frozen-yaw", case_of(3602, other_yaw(lambda d, log: [87.25] * log.yaw_t.size)), refused(FROZEN))
 
 
@@ -502,9 +596,17 @@ def other_drive(which: str) -> Bend:
         log = drawn.log()
         other = replace(drawn, seed=drawn.seed + 50, pieces=tuple(varied(180.0, drawn.seed + 50))).log()
         mixed = (
-            replace(log, east_m=np.interp(log.fix_t, other.fix_t, other.east_m), north_m=np.interp(log.fix_t, other.fix_t, other.north_m))
+            replace(
+                log,
+                east_m=np.interp(log.fix_t, other.fix_t, other.east_m),
+                north_m=np.interp(log.fix_t, other.fix_t, other.north_m),
+            )
             if which == "fixes"
-            else replace(log, left=np.interp(log.wheel_t, other.wheel_t, other.left).astype(np.int64), right=np.interp(log.wheel_t, other.wheel_t, other.right).astype(np.int64))
+            else replace(
+                log,
+                left=np.interp(log.wheel_t, other.wheel_t, other.left).astype(np.int64),
+                right=np.interp(log.wheel_t, other.wheel_t, other.right).astype(np.int64),
+            )
         )
         write_run(folder, mixed)
         return Truth.of(log)

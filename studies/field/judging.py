@@ -31,7 +31,7 @@ class Told:
 
     @property
     def is_run(self) -> bool:
-        """Whether this is a run's result; else it is the vehicle's, whose verdict counts where there are several runs."""
+        """Whether this is a run's result; the vehicle's counts where there are several runs."""
         return self.run.endswith("calibration.json")
 
     @property

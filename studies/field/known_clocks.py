@@ -118,7 +118,10 @@ def retimed(change: Callable[[float], float], log: Log | None = None) -> Callabl
     def build(folder: Path) -> Truth:
         told = log or base()
         write_vehicle(folder, told)
-        clock = lambda t: f"{change(t):.6f}"  # noqa: E731
+
+        def clock(t: float) -> str:
+            return f"{change(t):.6f}"
+
         write_encoder(folder, told, clock)
         write_ahrs(folder, told, clock)
         write_lines(folder / "gnss.nmea", [f"{clock(t)} {text}" for t, text in nmea_lines(told)])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from studies.arrays import FloatArray, stream
+from studies.arrays import BoolArray, FloatArray, floats, recursive, stream
 from studies.earth import sentence
-from studies.field.drives import Piece, headlands, rows, varied
+from studies.field.drives import Piece, rows, varied
 from studies.field.files import (
     heading_of,
     nmea_lines,
@@ -22,7 +23,6 @@ from studies.field.files import (
 )
 from studies.field.wanted import (
     ANY,
-    ANY_LEVEL,
     NOT_GOOD,
     Chapter,
     Diagnosis,
@@ -65,8 +65,6 @@ def read_as(
     """A plain drive whose AHRS reads something else."""
 
     def build(folder: Path) -> Truth:
-        from dataclasses import replace
-
         motion = move(pieces, seed, Robot(), begin_rad=begin_rad)
         instruments = replace(told or Instruments(), yaw=functools.partial(yaw, motion))
         log = sense(motion, seed, Robot(), instruments)
@@ -148,10 +146,10 @@ def slow_frozen(motion: Motion, t: FloatArray, heading: FloatArray) -> FloatArra
     return held(heading, (speed > 0.02) & (speed < 0.45))
 
 
-def held(values: FloatArray, while_: FloatArray) -> FloatArray:
+def held(values: FloatArray, while_: BoolArray) -> FloatArray:
     """Values that keep the last one while something is so."""
     newest = np.where(while_, 0, np.arange(values.size))
-    return np.asarray(values[np.maximum.accumulate(newest)], dtype=np.float64)
+    return floats(values[np.maximum.accumulate(newest)])
 
 
 FROZEN = r"(frozen|stands? still|does not (move|change|turn)|stuck|constant|held)"
@@ -186,8 +184,8 @@ def field_in_body(forward: float, left: float) -> Yaw:
 
     def yaw(motion: Motion, t: FloatArray, heading: FloatArray) -> FloatArray:
         seen_forward, seen_left = np.sin(heading) + forward, np.cos(heading) + left
-        reading = np.pi / 2.0 - np.arctan2(seen_left, seen_forward)
-        return heading + (reading - heading + np.pi) % (2.0 * np.pi) - np.pi
+        reading = floats(np.pi / 2.0 - np.arctan2(seen_left, seen_forward))
+        return floats(heading + (reading - heading + np.pi) % (2.0 * np.pi) - np.pi)
 
     return yaw
 
@@ -223,7 +221,7 @@ COMPASS.add(
 def beside_shed(motion: Motion, t: FloatArray, heading: FloatArray) -> FloatArray:
     """Nine degrees beside a long wall of steel, half of it two metres away."""
     away_m = np.abs(motion.at(motion.east_m, t) - motion.east_m.max() - 1.0)
-    return heading + np.radians(9.0) / (1.0 + (away_m / 2.0) ** 2)
+    return floats(heading + np.radians(9.0) / (1.0 + (away_m / 2.0) ** 2))
 
 
 COMPASS.add("steel-shed", read_as(rows(9, 16.0, 0.8, 0.6), 154, beside_shed, heading_offset_deg=(12.0, 21.5)), honest())
@@ -235,7 +233,7 @@ def course(motion: Motion, t: FloatArray, heading: FloatArray) -> FloatArray:
     moved = [motion.at(axis, t) - motion.at(axis, t - 0.6) for axis in (motion.east_m, motion.north_m)]
     east, north = (axis + 0.006 * rng.standard_normal(t.size) for axis in moved)
     newest = held(np.arctan2(north, east), np.hypot(east, north) < 0.12)
-    return np.asarray(np.unwrap(newest), dtype=np.float64)
+    return floats(np.unwrap(newest))
 
 
 PLAIN = Instruments(ahrs_hz=10.0, offset_deg=0.0, yaw_white_deg=0.02, yaw_slow=(0.0, 15.0))
@@ -270,8 +268,6 @@ def lagging(tau_s: float) -> Yaw:
 
 def lowpassed(values: FloatArray, step_s: float, tau_s: float) -> FloatArray:
     """A first-order low-pass that begins settled."""
-    from studies.arrays import recursive
-
     share = float(np.exp(-step_s / tau_s))
     return recursive((1.0 - share) * values, share, float(values[0]))
 
@@ -345,4 +341,3 @@ ZEROS.add(
     right(1.3),
     asked=(inspected(never=(r"iron near the compass",)),),
 )
-__all__ = ["ANY_LEVEL", "CHAPTERS", "headlands"]

@@ -1,14 +1,15 @@
-"""Known cases of fixes: float and wrong ones, a base that settles, filters, tilt, and coordinates of another meaning."""
+"""Known cases of fixes: float and wrong ones, a base that settles, filters, tilt, other coordinates."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from studies.arrays import FloatArray, stream
+from studies.arrays import FloatArray, floats, stream
 from studies.field.drives import headlands, varied
 from studies.field.files import FIX_HEAD, nmea_lines, stamped, without_fixes, write_fixes, write_lines, write_run
 from studies.field.known_headings import lowpassed
@@ -116,15 +117,21 @@ def on_hills(
             log,
             east_m=log.east_m + forward * np.cos(heading) - left * np.sin(heading),
             north_m=log.north_m + forward * np.sin(heading) + left * np.cos(heading),
-            tilt_deg=tuple(
-                np.degrees(angle) + 0.1 * stream(seed, name).standard_normal(log.yaw_t.size)
-                for angle, name in zip(tilt(log, log.yaw_t), ("pitch", "roll"), strict=True)
-            ),
+            tilt_deg=logged_tilt(tilt(log, log.yaw_t), seed),
         )
         write_run(folder, shown)
         return Truth.of(log, {"antenna_height": {"m": height_m}})
 
     return build
+
+
+def logged_tilt(tilt: tuple[FloatArray, FloatArray], seed: int) -> tuple[FloatArray, FloatArray]:
+    """Pitch and roll in degrees, with a little noise."""
+    pitch, roll = (
+        floats(np.degrees(angle) + 0.1 * stream(seed, name).standard_normal(angle.size))
+        for angle, name in zip(tilt, ("pitch", "roll"), strict=True)
+    )
+    return pitch, roll
 
 
 def plane(log: Log, t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -188,9 +195,8 @@ MEANING.add("place-6-decimals", west(digits(6)), right(3.0, ANY_LEVEL))
 
 def in_minutes(lat: float, lon: float) -> tuple[str, str]:
     """Degrees, and minutes where the decimals of degrees should be: 8.4832 for 8° 48.32'."""
-    return tuple(
-        f"{np.sign(angle) * (int(abs(angle)) + (abs(angle) - int(abs(angle))) * 0.6):.9f}" for angle in (lat, lon)
-    )
+    north, east = (math.copysign(int(abs(angle)) + abs(angle) % 1.0 * 0.6, angle) for angle in (lat, lon))
+    return f"{north:.9f}", f"{east:.9f}"
 
 
 COMMON = r"(minutes|ddmm|notation|fixes' scale|scale of the fixes|both radii and the track|same (factor|share))"

@@ -71,11 +71,13 @@ def hdt_cut(folder: Path) -> Truth:
     write_encoder(folder, log)
     rng, headings = stream(4, "cut lines"), heading_of(log)
     lines: list[str] = []
-    for number, (t, text) in enumerate(nmea_lines(log)):
+    fixes = 0
+    for t, text in nmea_lines(log):
         lines.append(f"{t:.4f} {text}")
         if "GGA" not in text:
             continue
-        heading = sentence(f"GNHDT,{headings[len([1 for one in lines if 'GGA' in one]) - 1]:.3f},T")
+        heading = sentence(f"GNHDT,{headings[fixes]:.3f},T")
+        fixes += 1
         at = int(rng.integers(8, 13)) if rng.random() < 0.15 else 0
         if at:
             lines += [f"{t + 0.001:.4f} {heading[:at]}", f"{t + 0.1:.4f} {heading[at:]}"]
@@ -220,11 +222,14 @@ def pos(folder: Path) -> Truth:
     return Truth.of(base())
 
 
+POS_REST = "height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m) age(s) ratio"
+
+
 def write_pos(path: Path, log: Log) -> None:
     """Such a file."""
     lines = [
         "% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp,ns=# of satellites)",
-        "%  GPST   latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m) sdne(m) sdeu(m) sdun(m) age(s) ratio",
+        f"%  GPST   latitude(deg) longitude(deg) {POS_REST}",
     ]
     latitudes, longitudes = log.places
     for t, lat, lon in zip(log.fix_t.tolist(), latitudes.tolist(), longitudes.tolist(), strict=True):

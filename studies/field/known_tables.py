@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
-from studies.arrays import stream
+from studies.arrays import gauss_markov, stream
 from studies.field.files import (
     FIX_HEAD,
     Row,
@@ -26,7 +27,7 @@ from studies.field.files import (
 )
 from studies.field.known_clocks import base
 from studies.field.wanted import ANY_LEVEL, Chapter, Truth, doubted, inspected, refused, right
-from studies.field.world import Log
+from studies.field.world import ORIGIN, Log
 
 QUALITY = Chapter("known", "quality codes")
 TABLES = Chapter("known", "tables")
@@ -49,9 +50,6 @@ def unaided(log: Log, number: int) -> bool:
 
 def wandering(log: Log, seed: int, sigma_m: float, tau_s: float = 100.0) -> list[tuple[float, float]]:
     """A slow error of unaided fixes in degrees of latitude and longitude, for every fix."""
-    from studies.arrays import gauss_markov
-    from studies.field.world import ORIGIN
-
     rng, step_s = stream(seed, "unaided fixes"), float(log.fix_t[1] - log.fix_t[0])
     east, north = (gauss_markov(rng.standard_normal(log.fix_t.size), step_s, sigma_m, tau_s) for _ in range(2))
     metres = 111_200.0
@@ -242,7 +240,7 @@ def wheel_rates(log: Log) -> list[tuple[float, float]]:
     """Counts a second of the left and the right wheel, since the row before."""
     step_s = float(log.wheel_t[1] - log.wheel_t[0])
     pairs = list(zip(log.left.tolist(), log.right.tolist(), strict=True))
-    return [((b[0] - a[0]) / step_s, (b[1] - a[1]) / step_s) for a, b in zip(pairs[:-1], pairs[1:], strict=True)]
+    return [((b[0] - a[0]) / step_s, (b[1] - a[1]) / step_s) for a, b in pairwise(pairs)]
 
 
 def yaws(head: Row, row: Callable[[int, Row], Row]) -> Callable[[Path], Truth]:

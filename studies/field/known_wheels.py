@@ -74,7 +74,10 @@ def either_way(log: Log) -> Truth:
 
 BACKWARDS = r"(negat|backwards|revers|wrong way)"
 EXCHANGED = r"(exchang|swap|crossed)"
-BOTH_FIRST = r"^(?:(?!exchang|swap)[\s\S])*?((negat\w*|revers\w*|backwards?)[^.;]{0,40}both|both[^.;]{0,60}(negat|backwards?|revers))"
+BOTH_FIRST = (
+    r"^(?:(?!exchang|swap)[\s\S])*?"
+    r"((negat\w*|revers\w*|backwards?)[^.;]{0,40}both|both[^.;]{0,60}(negat|backwards?|revers))"
+)
 WIRING.add(
     "counter-right-reversed", miscounted(varied(200.0, 51), 51, lambda left, r: (left, -r)), refused("right", BACKWARDS)
 )
@@ -254,7 +257,10 @@ def grown(seed: int, right_factor: float, left_factor: float, at_s: float) -> Ca
 
 
 NOT_GOOD_WAY = Way("not good", (0,), NOT_GOOD)
-ONE_TYRE = r"(right (wheel|tyre|radius)[^.;]{0,80}(chang|step|small|shrink|grow|loses|3\.\d|2\.\d)|radius_step_right|right wheel's radius)"
+ONE_TYRE = (
+    r"(right (wheel|tyre|radius)[^.;]{0,80}(chang|step|small|shrink|grow|loses|3\.\d|2\.\d)|"
+    r"radius_step_right|right wheel's radius)"
+)
 TYRES.add(
     "tyre-puncture",
     grown(160, 0.97, 1.0, 110.0),

@@ -73,7 +73,7 @@ def move(
     """Drive the pieces with rounded corners."""
     ground = ground or Ground()
     v, w = _profile(pieces, 1, soft_s), _profile(pieces, 2, soft_s)
-    t_s = np.arange(v.size) * STEP_S
+    t_s = floats(np.arange(v.size) * STEP_S)
     begin = float(stream(seed, "field start").uniform(-3.0, 3.0)) if begin_rad is None else begin_rad
     heading = begin + _summed(w)
     middle = heading - 0.5 * w * STEP_S
@@ -94,7 +94,7 @@ def move(
 def _profile(pieces: Sequence[Piece], which: int, soft_s: float) -> FloatArray:
     """Speed or turn rate at each step, averaged under a cosine window so that nothing jumps."""
     steps = np.concatenate([np.full(max(1, round(piece[0] / STEP_S)), piece[which]) for piece in pieces])
-    window = np.hanning(max(3, int(soft_s / STEP_S) + 2))
+    window = floats(np.hanning(max(3, int(soft_s / STEP_S) + 2)))
     before, after = np.full(window.size, steps[0]), np.full(window.size, steps[-1])
     padded = np.convolve(np.concatenate([before, steps, after]), window / window.sum(), "same")
     return floats(padded[window.size : -window.size])
