@@ -425,6 +425,7 @@ NAMES.add(
     case_of(3307, fixes_called(8)),
     refused(r"(quality 8|simulat(or|ed|ion))"),
     doubted(r"simulat"),
+    right(2.0, ANY_LEVEL, (r"simulat",)),
 )
 NAMES.add("quality-0-all", case_of(3308, fixes_called(0)), refused(r"(quality 0|no fix|without a fix|invalid)"))
 
@@ -510,7 +511,7 @@ NOTATION = (
     r"(minutes|seconds of arc|notation|dd\.?mm|sexagesimal|fixes' scale|scale of the fixes|"
     r"both radii and the track|same (factor|share))"
 )
-SCALED = r"(scale|unit|1e-?\d|10\^|10[⁵⁶⁷]|integer|micro|radian|degrees)"
+SCALED = r"(scale|unit|1e-?\d|10\^|10[⁵⁶⁷]|integer|micro|million)"
 FAR = r"(far|times as|metres|degrees|latitude|scale|unit|beyond)"
 PLACES.add(
     "place-packed-seconds",
@@ -540,7 +541,7 @@ PLACES.add(
 )
 PLACES.add(
     "place-south-no-sign",
-    case_of(3504, placed(lambda lat, lon, e, n: (f"{33.9 - (lat - 47.4):.9f}", f"{lon + 143.0:.9f}"))),
+    case_of(3504, placed(lambda lat, lon, e, n: (f"{94.8 - lat:.9f}", f"{lon + 143.0:.9f}"))),
     refused(MIRRORED),
     doubted(MIRRORED),
 )
@@ -566,9 +567,7 @@ def other_yaw(make: Callable[[Drawn, Log], list[float]]) -> Bend:
     return bend
 
 
-NO_HEADING = (
-    r"(no heading|not a heading|do(es)? not (turn|belong|agree|follow)|together|frozen|constant|noise|correlation)"
-)
+NO_HEADING = r"(no heading|not a heading|do(es)? not (turn|belong|agree|follow)|together|frozen|stuck|wrong column|constant|noise|correlation)"
 NONSENSE.add(
     "nonsense-voltage",
     case_of(

@@ -72,8 +72,14 @@ def after(log: Log, counts: IntArray, begin_s: float) -> IntArray:
     return np.where(log.wheel_t < begin_s, counts, last)
 
 
-SILENT = r"left[^.;]{0,80}(never|does not|do not|stands still|silent|stuck|constant|stops?|not (change|move|count))"
-STOPS = r"right[^.;]{0,100}(from|after|at|since|stops?|silent|stuck|stands|does not|no longer)"
+SILENT = (
+    r"left[^.;]{0,80}"
+    r"(never|does not|do not|stands still|silent|stuck|constant|stops?|hardly moves|not (change|move|count))"
+)
+STOPS = (
+    r"right[^.;]{0,60}(counter|ticks|wheel|encoder)[^.;]{0,80}"
+    r"(stops|silent|stuck|stands still|does not (move|count|change)|no longer|hardly moves|frozen)"
+)
 STAYS = r"(saturat|32767|stays at|stuck|stops? (counting|at)|full|stands)"
 COUNTERS.add(
     "counter-left-silent", case_of(5000, counted(lambda d, log: (np.zeros_like(log.left), log.right))), refused(SILENT)
@@ -392,7 +398,7 @@ for seed in (5300, 5301):
         honest(),
         diagnosis=Diagnosis(names=("heading_scale",)),
     )
-GAIN = r"(gain|scale|slope (of )?(1\.9|2\.0)|twice|double|too much|heading_scale)"
+GAIN = r"(gain is off|gain of|\bgyro|slope (of )?(1\.9|2\.0)|twice|double|heading_scale)"
 HEADINGS.add(
     "gain-double",
     case_of(5302, read_as(lambda d, whole, t, heading: whole[0] + 2.0 * (heading - whole[0]), heading_offset_deg=ANY)),

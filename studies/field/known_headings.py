@@ -87,7 +87,7 @@ GAINS.add(
     diagnosis=SCALE,
 )
 GAINS.add("gain-0.3pc", read_as(varied(300.0, 2), 21, gained(1.003), {"heading_scale": {"ratio": 0.003}}), honest())
-HALF = r"(half|0\.[45]\d* (of|times)|gain|scale|slope (of )?0\.[45]|counts too little|heading_scale)"
+HALF = r"(\bhalf\b|gain is off|gain of|\bgyro|slope (of )?0\.[45]|heading_scale)"
 GAINS.add("gain-half", read_as(varied(200.0, 3), 23, gained(0.5), heading_offset_deg=ANY), refused(HALF), doubted(HALF))
 GAINS.add(
     "gain-rows",

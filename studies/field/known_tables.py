@@ -269,7 +269,7 @@ YAW.add(
 YAW.add("yaw-zeros-10pc", yaws(["t", "yaw_deg"], zeroed(0.1)), right(2.0, ANY_LEVEL), refused(ZEROS), never=SHIFTED)
 
 HUNDREDTHS = r"(hundred|centi|0\.01|1/100|× ?100|factor of (about )?(100|9\d|10\d)|100 times)"
-UNIT = r"(unit|hundred|centi|radian|57\.\d)"
+UNIT = r"(\bunits?\b|hundred|centi|radian|57\.\d|of a turn|times too|parts? of a degree)"
 YAW.add(
     "yaw-centidegrees",
     yaws(["t", "yaw_deg"], lambda _, row: [row[0], f"{round(float(row[1]) % 360.0 * 100.0)}"]),
