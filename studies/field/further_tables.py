@@ -567,7 +567,10 @@ def other_yaw(make: Callable[[Drawn, Log], list[float]]) -> Bend:
     return bend
 
 
-NO_HEADING = r"(no heading|not a heading|do(es)? not (turn|belong|agree|follow)|together|frozen|stuck|wrong column|constant|noise|correlation)"
+NO_HEADING = (
+    r"(no heading|not a heading|do(es)? not (turn|belong|agree|follow)|together|"
+    r"frozen|stuck|wrong column|constant|noise|correlation)"
+)
 NONSENSE.add(
     "nonsense-voltage",
     case_of(
