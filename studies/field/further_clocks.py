@@ -212,7 +212,7 @@ HOSTS.add(
     "table-stamps-late",
     case_of(2206, tables_late),
     honest(),
-    diagnosis=Diagnosis(names=("gnss_latency",), or_says=(r"latency|clock offset",)),
+    diagnosis=Diagnosis(names=("gnss_latency",), or_says=(r"latency|\blate\b",)),
 )
 
 

@@ -286,7 +286,7 @@ def one_tyre(which: str, low: float, high: float) -> Callable[[Drawn], tuple[Gro
 
 def one_wheel_said(which: str) -> Diagnosis:
     """A finding that names the wheel."""
-    pattern = rf"{which}( wheel| tyre| radius|_)?[^.;]{{0,80}}(chang|step|small|large|shrink|grow|drift|loses|%)"
+    pattern = rf"{which}( wheel| tyre| radius|_)?[^.;]{{0,80}}(chang|step|smaller|larger|shrink|grow|drift|loses)"
     return Diagnosis(names=(f"radius_step_{which}", f"radius_drift_{which}"), or_says=(pattern,))
 
 
@@ -327,7 +327,7 @@ GROUND.add(
     honest(TWO_SIDES),
     diagnosis=Diagnosis(names=("turn_side", "track_side"), or_says=(TWO_SIDES,)),
 )
-SURFACES = r"(track[^.;]{0,80}(chang|step|jump|differ)|two surfaces|surface|track_step)"
+SURFACES = r"(track[^.;]{0,80}(chang|step|jump|differ)|two surfaces|surfaces? (chang|differ)|track_step)"
 GROUND.add(
     "two-surfaces",
     case_of(5203, grounds(two_surfaces), 240.0),
@@ -405,7 +405,7 @@ HEADINGS.add(
     refused(GAIN),
     doubted(GAIN),
 )
-JUMP = r"(jump|step|window|from \d|reboot)"
+JUMP = r"(jumps?|headings? (of|from|between)|bad headings|reboot)"
 HEADINGS.add(
     "yaw-reboots",
     case_of(

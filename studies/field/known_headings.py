@@ -106,7 +106,9 @@ JUMPS.add(
     "yaw-aligned-late",
     read_as(varied(220.0, 110), 110, between(0.0, 15.0, 97.0)),
     honest(),
-    diagnosis=Diagnosis(names=("heading_step", "heading_window"), or_says=(r"(1[2-8](\.\d+)? s|first \d+ s)",)),
+    diagnosis=Diagnosis(
+        names=("heading_step", "heading_window"), or_says=(r"(at|until|for|first|before) 1[2-8](\.\d+)? s",)
+    ),
 )
 JUMPS.add(
     "yaw-jumps-twice",

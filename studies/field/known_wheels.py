@@ -125,7 +125,9 @@ def slowest(counts: IntArray, share: float) -> IntArray:
     return np.concatenate([[0], np.cumsum(np.clip(steps, -most, most))])
 
 
-SATURATES = r"(saturat|count(s|er|ing)? .{0,60}(lost|miss|above|fast)|(lost|miss\w*|loses) .{0,30}counts|missed_right)"
+SATURATES = (
+    r"(saturat|cannot count faster|counts? [^.;]{0,30}(lost|missed) above|(lost|missed|loses|misses) [^.;]{0,20}counts)"
+)
 WIRING.add(
     "counter-right-saturates",
     miscounted(varied(220.0, 164), 164, lambda left, r: (left, slowest(r, 0.75))),
@@ -209,9 +211,7 @@ SKIDS.add(
     Way("not good", (0,), NOT_GOOD),
     honest(r"turn"),
 )
-GROUNDS = (
-    r"(track .{0,80}(chang|step|jump|differ)|two surfaces|surface|track_step|turns? .{0,40}(from|after) .{0,20} s\b)"
-)
+GROUNDS = r"(track .{0,80}(chang|step|jump|differ)|two surfaces|surfaces? (chang|differ)|track_step)"
 SKIDS.add(
     "skid-ground",
     skidding(103, None, lambda v, w, t: 0.555 * np.where(t < 110.0, 1.75, 1.45), (1.45, 1.75)),
@@ -258,7 +258,7 @@ def grown(seed: int, right_factor: float, left_factor: float, at_s: float) -> Ca
 
 NOT_GOOD_WAY = Way("not good", (0,), NOT_GOOD)
 ONE_TYRE = (
-    r"(right (wheel|tyre|radius)[^.;]{0,80}(chang|step|small|shrink|grow|loses|3\.\d|2\.\d)|"
+    r"(right (wheel|tyre|radius)[^.;]{0,80}(chang|step|smaller|shrink|grow|loses)|"
     r"radius_step_right|right wheel's radius)"
 )
 TYRES.add(
@@ -357,13 +357,13 @@ SCALES.add(
     "car-late-coarse",
     driven(road(240.0, 1), 130, CAR, LATE, Ground(0.01), 2.5, ("gnss_latency",)),
     honest(),
-    diagnosis=Diagnosis(names=("gnss_latency", "lever_arm"), or_says=(r"latency|clock|late",)),
+    diagnosis=Diagnosis(names=("gnss_latency", "lever_arm"), or_says=(r"latency|\blate\b",)),
 )
 SCALES.add(
     "car-late-fine",
     driven(road(240.0, 2), 271, replace(CAR, ticks_per_rev=2000), LATE, Ground(0.01), 2.5, ("gnss_latency",)),
     honest(),
-    diagnosis=Diagnosis(names=("gnss_latency",), or_says=(r"latency|clock",)),
+    diagnosis=Diagnosis(names=("gnss_latency",), or_says=(r"latency|\blate\b",)),
 )
 SCALES.add(
     "car-arm",
