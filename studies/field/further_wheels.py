@@ -26,6 +26,7 @@ from studies.field.known_wheels import (
     either_way,
     rising,
     slowest,
+    track_span,
 )
 from studies.field.wanted import (
     ANY,
@@ -278,7 +279,8 @@ def one_tyre(which: str, low: float, high: float) -> Callable[[Drawn], tuple[Gro
 
         radius_m = drawn.robot.radius_right_m if which == "right" else drawn.robot.radius_left_m
         return Ground(growth=growth), {
-            f"radius_{which}_m": (min(radius_m, radius_m * share), max(radius_m, radius_m * share))
+            f"radius_{which}_m": (min(radius_m, radius_m * share), max(radius_m, radius_m * share)),
+            "track_m": track_span(drawn.robot.track_m, share),
         }
 
     return make
@@ -350,6 +352,7 @@ def slippery_stretch(drawn: Drawn) -> tuple[Ground, dict[str, tuple[float, float
     return Ground(growth=growth), {
         "radius_right_m": (keeps * robot.radius_right_m, robot.radius_right_m),
         "radius_left_m": (keeps * robot.radius_left_m, robot.radius_left_m),
+        "track_m": track_span(robot.track_m, keeps),
     }
 
 

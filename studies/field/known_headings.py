@@ -341,5 +341,5 @@ ZEROS.add(
     "inspect-arcs",
     read_as(varied(180.0, 180), 180, lambda m, t, heading: heading),
     right(1.3),
-    asked=(inspected(never=(r"iron near the compass",)),),
+    asked=(inspected(r"yaw minus course of the fixes: 1[0-4]\.\d+ deg", never=(r"iron near the compass",)),),
 )

@@ -236,6 +236,12 @@ def two_runs(folder: Path) -> Truth:
     return Truth.of(record(varied(20.0, 1), 1, SKID), track_m=(0.555 * 1.45, 0.555 * 1.75))
 
 
+def track_span(track_m: float, share: float) -> tuple[float, float]:
+    """Where a constant track may lie whose wheels are of two sizes, in turn, that differ by a share."""
+    low = min(share, 1.0 / share)
+    return track_m * low, track_m / low
+
+
 def grown(seed: int, right_factor: float, left_factor: float, at_s: float) -> Callable[[Path], Truth]:
     """Radii that change at a moment."""
 
@@ -251,6 +257,7 @@ def grown(seed: int, right_factor: float, left_factor: float, at_s: float) -> Ca
             {"radius_step": {"at_s": at_s}},
             radius_right_m=(min(right_m, right_m * right_factor), max(right_m, right_m * right_factor)),
             radius_left_m=(min(left_m, left_m * left_factor), max(left_m, left_m * left_factor)),
+            track_m=track_span(log.robot.track_m, min(right_factor, left_factor)),
         )
 
     return build
@@ -283,7 +290,12 @@ def bank_slip(folder: Path) -> Truth:
     log = record(varied(240.0, 166), 166, None, Ground(growth=growth))
     write_run(folder, log)
     right_m, left_m = log.robot.radius_right_m, log.robot.radius_left_m
-    return Truth.of(log, radius_right_m=(0.88 * right_m, right_m), radius_left_m=(0.88 * left_m, left_m))
+    return Truth.of(
+        log,
+        radius_right_m=(0.88 * right_m, right_m),
+        radius_left_m=(0.88 * left_m, left_m),
+        track_m=(0.88 * log.robot.track_m, log.robot.track_m / 0.88),
+    )
 
 
 def driven(
