@@ -288,7 +288,7 @@ def one_tyre(which: str, low: float, high: float) -> Callable[[Drawn], tuple[Gro
 
 def one_wheel_said(which: str) -> Diagnosis:
     """A finding that names the wheel."""
-    pattern = rf"{which}( wheel| tyre| radius|_)?[^.;]{{0,80}}(chang|step|smaller|larger|shrink|grow|drift|loses)"
+    pattern = rf"({which} (wheel|tyre|radius|side)[^.;]{{0,80}}(chang|step|smaller|larger|shrink|grow|drift|loses))"
     return Diagnosis(names=(f"radius_step_{which}", f"radius_drift_{which}"), or_says=(pattern,))
 
 
