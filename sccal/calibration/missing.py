@@ -3,9 +3,16 @@
 The log is thinned, no moments and places are searched for, no forms compared, nothing refitted: a diagnosis does that.
 The noise is estimated beside the candidates, since under the noise of a model that lacks something nothing seems to be
 missing.
+
+What is missing in a model moves its constants, by more than any sigma says that takes the model for true. By how much
+is seen at once in the same quick fit, with the strongest of what it lacks and without.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from sccal.arrays import Floats
 from sccal.calibration.result import Missing
@@ -13,10 +20,12 @@ from sccal.effects.logged import logged_effects
 from sccal.effects.view import DriveView
 from sccal.evidence.candidates import without_shadows
 from sccal.evidence.extension import Free, plain_forms
-from sccal.evidence.model import Accepted, model_of
+from sccal.evidence.joint import at_least
+from sccal.evidence.model import Accepted, Model, model_of, refitted
 from sccal.evidence.posterior import PRICE_NATS
 from sccal.evidence.saturated import saturate
 from sccal.filter.iterate import At, RunProblem
+from sccal.filter.layout import OFFSET
 from sccal.filter.noise import Reach
 from sccal.filter.start import Constants
 
@@ -24,7 +33,23 @@ STRONG_NATS = 20.0
 """Odds of 5 × 10⁸: a quick look that is wrong would take the verdict from a good log."""
 
 
-def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float) -> tuple[Missing, ...]:
+@dataclass(frozen=True)
+class Lacking:
+    """What a model lacks, and what that does to its constants."""
+
+    missing: tuple[Missing, ...] = ()
+    """Strongest first."""
+    apart: Floats = field(default_factory=lambda: np.zeros(4))
+    """(4,) R_r, R_l, L and heading offset with it less without, m and rad."""
+    sigmas: Floats = field(default_factory=lambda: np.zeros(4))
+    """(4,) what they are known to with it."""
+
+    def widened(self, covariance: Floats) -> Floats:
+        """The covariance (4, 4) of the constants, owning up to what is missing."""
+        return at_least(covariance, np.diag(self.sigmas**2)) + np.outer(self.apart, self.apart)
+
+
+def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float) -> Lacking:
     """Effects with strong evidence and a size that matters beside a run's own model; values (4 + m,) as found."""
     start = At(Constants.of(values), values[4:])
     model = model_of([problem], [start], heading_rate_hz, thinned=True)
@@ -41,7 +66,20 @@ def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float
         if key in kept
     ]
     strong = [one for one in found if one.evidence_nats >= STRONG_NATS and one.size >= 1.0]
-    return tuple(sorted(strong, key=lambda one: -one.evidence_nats))
+    if not strong:
+        return Lacking()
+    names = {one.effect for one in strong}
+    chosen = [*model.accepted, *(one for one in candidates if one.free.effect.name in names)]
+    whole = refitted(full.model, chosen, full.given([one.key for one in chosen]), Reach.LOOK)
+    apart = _constants(whole) - _constants(model)
+    apart[3] = float(np.angle(np.exp(1j * apart[3])))
+    sigmas = np.append(np.sqrt(np.diag(whole.fit.robust)[:3]), np.sqrt(whole.path(0).final_covariance[OFFSET, OFFSET]))
+    return Lacking(tuple(sorted(strong, key=lambda one: -one.evidence_nats)), apart, sigmas)
+
+
+def _constants(model: Model) -> Floats:
+    """R_r, R_l, L and the heading offset (4,) of the only run."""
+    return np.append(model.fit.values[:3], model.path(0).final_state[OFFSET])
 
 
 def _candidates(view: DriveView) -> list[Free]:

@@ -100,12 +100,14 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     if options.filter.with_offset:
         covariance[3, 3] += _variance_of_the_level(problem)
     drive = describe_drive(aligned, float(values[:2].mean()))
+    lacking = look_for_missing(problem, values, options.heading_rate_hz)
+    constants = lacking.widened(covariance[:4, :4])
     return (
         Calibration(
             run=aligned.name,
             vehicle=aligned.vehicle,
             with_offset=options.filter.with_offset,
-            parameters=judge(values[:4], covariance[:4, :4], aligned.vehicle, options.filter, drive),
+            parameters=judge(values[:4], constants, aligned.vehicle, options.filter, drive),
             origin_lat_deg=aligned.plane.lat_deg,
             origin_lon_deg=aligned.plane.lon_deg,
             origin_alt_m=aligned.plane.alt_m,
@@ -127,7 +129,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
             causes=find_causes(problem, final, values, start.moving_from_s + SETTLED_S),
             consistency=consistency_over_time(problem, final),
             manoeuvres=describe_manoeuvres(aligned, values),
-            missing=look_for_missing(problem, values, options.heading_rate_hz),
+            missing=lacking.missing,
         ),
         problem,
     )
