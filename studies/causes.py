@@ -25,13 +25,15 @@ SHAPES = {"at_s", "radius_m", "above_radps", "tau_s"}
 ON_HILLS = {"slope", "roll_slip", "antenna_height"}
 OWN_CLOCK = {"clock_skew"}
 """Effects that only a log without a second clock can show."""
+SIDES = (("", "_left"), ("", "_right"), ("_left", "_right"))
 CLASHES = (
     {"missed_left", "eccentric_left"},
     {"missed_right", "eccentric_right"},
     {"speed_offset", "eccentric_left"},
     {"speed_offset", "eccentric_right"},
+    *({f"{what}{one}", f"{what}{other}"} for what in ("radius_drift", "radius_step") for one, other in SIDES),
 )
-"""Pairs without a meaning: an eccentric wheel's angle has to be counted whole."""
+"""Pairs without a meaning: an eccentric wheel's angle has to be counted whole, and both wheels' shares are also one's."""
 COLUMN_SIZES = {
     "motor_current_a": 1.8,
     "ambient_c": 3.5,
@@ -115,6 +117,11 @@ def radius_step(rng: np.random.Generator, scenario: Scenario) -> Parameters:
     return {"ratio": pick_sign(rng) * log_uniform(rng, 0.008, 0.05), "at_s": moment_s(rng, scenario)}
 
 
+def track_step(rng: np.random.Generator, scenario: Scenario) -> Parameters:
+    """A track that jumps by 4 to 25 %."""
+    return {"ratio": pick_sign(rng) * log_uniform(rng, 0.04, 0.25), "at_s": moment_s(rng, scenario)}
+
+
 def heading_step(rng: np.random.Generator, scenario: Scenario) -> Parameters:
     """A heading that jumps by 3 to 30 degrees."""
     return {"deg": pick_sign(rng) * log_uniform(rng, 3.0, 30.0), "at_s": moment_s(rng, scenario)}
@@ -196,6 +203,11 @@ SIZES: dict[str, Sizer] = {
     "eccentric_right": eccentric,
     "missed_left": missed,
     "missed_right": missed,
+    "radius_drift_left": radius_drift,
+    "radius_drift_right": radius_drift,
+    "radius_step_left": radius_step,
+    "radius_step_right": radius_step,
+    "track_step": track_step,
 }
 COLUMN_SHARES = {
     "heading": (1.0, 6.0),

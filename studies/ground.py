@@ -13,7 +13,7 @@ ports `along`, `yaw`, `pull` and `side`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,8 +101,11 @@ class Radii:
 
     right_m: float
     left_m: float
-    growth: list[float]
-    """1 + k t + ratio [t > at], for each step."""
+    right_growth: list[float]
+    left_growth: list[float]
+    """1 + k t + ratio [t > at], for each step: what both wheels have, and what each has of its own."""
+    track_growth: list[float]
+    """1 + ratio [t > at], for each step."""
     right_off: tuple[float, float]
     left_off: tuple[float, float]
     """The parts cos and sin of ds = R (1 + cos · cos φ + sin · sin φ) dφ."""
@@ -110,11 +113,28 @@ class Radii:
     @staticmethod
     def of(right_m: float, left_m: float, effects: Effects, t_s: FloatArray) -> Radii:
         """The radii of a robot along its log."""
-        step = effects.get("radius_step", {"ratio": 0.0, "at_s": 0.0})
-        drift = effects.get("radius_drift", {}).get("per_hour", 0.0)
-        growth = 1.0 + drift * np.maximum(t_s, 0.0) / 3600.0 + step["ratio"] * (t_s > step["at_s"])
+        grown = growth(effects, "", t_s)
         right, left = (effects.get(f"eccentric_{side}", {"cos": 0.0, "sin": 0.0}) for side in ("right", "left"))
-        return Radii(right_m, left_m, growth.tolist(), (right["cos"], right["sin"]), (left["cos"], left["sin"]))
+        return Radii(
+            right_m,
+            left_m,
+            (grown + growth(effects, "_right", t_s) - 1.0).tolist(),
+            (grown + growth(effects, "_left", t_s) - 1.0).tolist(),
+            stepped(effects.get("track_step"), t_s).tolist(),
+            (right["cos"], right["sin"]),
+            (left["cos"], left["sin"]),
+        )
+
+
+def growth(effects: Effects, side: str, t_s: FloatArray) -> FloatArray:
+    """1 + k t + ratio [t > at] by the effects of both wheels, or of one side."""
+    per_hour = effects.get(f"radius_drift{side}", {}).get("per_hour", 0.0)
+    return stepped(effects.get(f"radius_step{side}"), t_s) + per_hour * np.maximum(t_s, 0.0) / 3600.0
+
+
+def stepped(step: Mapping[str, float] | None, t_s: FloatArray) -> FloatArray:
+    """1 + ratio [t > at]."""
+    return np.ones(t_s.size) if step is None else 1.0 + step["ratio"] * (t_s > step["at_s"])
 
 
 def eccentric_travel(off: tuple[float, float], from_rad: float, to_rad: float) -> float:

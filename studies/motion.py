@@ -180,7 +180,7 @@ class Body:
             a, self.last_v = -abs(self.last_v) / STEP_S, 0.0
             return 0.0, 0.0, a, 0.0
         says_right, says_left, goes_right, goes_left = self._turn_wheels(number, v_mean, w_mean)
-        track_m = self.robot.track_m
+        track_m = self.robot.track_m * self.radii.track_growth[number]
         v, w = 0.5 * (says_right + says_left) / STEP_S, (says_right - says_left) / track_m / STEP_S
         a, self.last_v = (abs(v) - abs(self.last_v)) / STEP_S, v
         place = (self.east_m, self.north_m, self.heading_rad)
@@ -200,7 +200,7 @@ class Body:
         aside = w_mean * 0.5 * robot.nominal_track_m
         right_to = self.right_rad + (v_mean + aside) * STEP_S / robot.nominal_radius_m
         left_to = self.left_rad + (v_mean - aside) * STEP_S / robot.nominal_radius_m
-        right_m, left_m = radii.right_m * radii.growth[number], radii.left_m * radii.growth[number]
+        right_m, left_m = radii.right_m * radii.right_growth[number], radii.left_m * radii.left_growth[number]
         says_right, says_left = right_m * (right_to - self.right_rad), left_m * (left_to - self.left_rad)
         kick_right, kick_left = self.kicks[self.moved]
         goes_right = says_right + right_m * eccentric_travel(radii.right_off, self.right_rad, right_to)

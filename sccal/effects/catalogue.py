@@ -18,8 +18,8 @@ from sccal.effects.heading_step import HeadingStep
 from sccal.effects.lever_arm import LeverArm
 from sccal.effects.local_field import LocalField
 from sccal.effects.missed import MissedLeft, MissedRight
-from sccal.effects.radius_drift import RadiusDrift
-from sccal.effects.radius_step import RadiusStep
+from sccal.effects.radius_drift import RadiusDrift, RadiusDriftLeft, RadiusDriftRight
+from sccal.effects.radius_step import RadiusStep, RadiusStepLeft, RadiusStepRight
 from sccal.effects.roll_slip import RollSlip
 from sccal.effects.side_slip import SideSlip
 from sccal.effects.slope import Slope
@@ -27,6 +27,7 @@ from sccal.effects.soft_iron import SoftIron
 from sccal.effects.speed_field import SpeedField
 from sccal.effects.speed_offset import SpeedOffset
 from sccal.effects.speed_slip import SpeedSlip
+from sccal.effects.track_step import TrackStep
 from sccal.effects.turn_scrub import TurnScrub
 from sccal.effects.turn_slip import TurnSlip
 from sccal.errors import UsageError
@@ -46,7 +47,12 @@ CATALOGUE: dict[str, Effect] = {
         Slope(),
         RollSlip(),
         RadiusDrift(),
+        RadiusDriftLeft(),
+        RadiusDriftRight(),
         RadiusStep(),
+        RadiusStepLeft(),
+        RadiusStepRight(),
+        TrackStep(),
         EccentricLeft(),
         EccentricRight(),
         MissedLeft(),

@@ -1,6 +1,6 @@
-"""Radius drift: both radii grow with time, as tyres warm up or soil builds up.
+"""Radius drift: radii that grow with time, as tyres warm up, lose air or pick up soil.
 
-travel = R φ (1 + k t)      each wheel; t from the start of the run
+travel = R φ (1 + k t)      both wheels, or the one that is named; t from the start of the run
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
+from sccal.effects.one_wheel import Wheels, wheel_columns, wheels_turned
 from sccal.effects.view import DriveView
 from sccal.effects.words import Measured, percent
 from sccal.simulate.physics import Physics
@@ -20,41 +21,70 @@ from sccal.simulate.world import Motion, WheelPair
 _HOUR_S = 3600.0
 
 
-class RadiusDrift(Effect):
-    """Growth of both radii, as a share of them per hour."""
+class _RadiusDrift(Effect):
+    """Growth of some wheels' radii, as a share of them per hour."""
 
-    name = "radius_drift"
     stage = "wheels"
-    title = "radii that grow during the run: warming tyres, soil that sticks"
     parameters = (Parameter("per_hour", "1/h", 0.05, -1.0, 1.0, scope="run", matters=0.01),)
-    looks_like = "both radii estimated from the first half of the run differ from those of the second half, gradually"
     excited_by = (
         "drive for half an hour or more at the same mix of speeds, repeating one straight at the start and the end"
     )
     reference = "Fazekas et al., Sensors 2021, 21, 337, on wheel radii that change while driving"
+    wheels: Wheels
+    whose: str
 
     def says(self, found: Mapping[str, Measured]) -> str:
+        plural = "" if len(self.wheels) > 1 else "s"
         grow = "grow" if found["per_hour"].value > 0.0 else "shrink"
-        return f"both wheels' radii {grow} by {percent(found['per_hour'])} an hour"
+        return f"{self.whose} {grow}{plural} by {percent(found['per_hour'])} an hour"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps
         hours = (steps.t_s - 0.5 * steps.dt_s - drive.start_s) / _HOUR_S
-        return (
-            Column("per_hour", "right_wheel", steps.right_m * hours),
-            Column("per_hour", "left_wheel", steps.left_m * hours),
-        )
+        return wheel_columns("per_hour", self.wheels, steps, hours)
 
     def physics(self, values: Mapping[str, float]) -> Physics:
-        return _Growing(values["per_hour"])
+        return _Growing(self.name, self.wheels, values["per_hour"])
+
+
+class RadiusDrift(_RadiusDrift):
+    """Growth of both radii, as a share of them per hour."""
+
+    name = "radius_drift"
+    title = "radii that grow during the run: warming tyres, soil that sticks"
+    looks_like = "both radii estimated from the first half of the run differ from those of the second half, gradually"
+    wheels = ("right", "left")
+    whose = "both wheels' radii"
+
+
+class RadiusDriftLeft(_RadiusDrift):
+    """Growth of the left radius, as a share of it per hour."""
+
+    name = "radius_drift_left"
+    title = "left wheel whose radius changes during the run: a slow puncture, soil that sticks"
+    looks_like = "by the wheels alone the path bends more and more to one side, and the left radius drifts"
+    wheels = ("left",)
+    whose = "the left wheel's radius"
+
+
+class RadiusDriftRight(_RadiusDrift):
+    """Growth of the right radius, as a share of it per hour."""
+
+    name = "radius_drift_right"
+    title = "right wheel whose radius changes during the run: a slow puncture, soil that sticks"
+    looks_like = "by the wheels alone the path bends more and more to one side, and the right radius drifts"
+    wheels = ("right",)
+    whose = "the right wheel's radius"
 
 
 @dataclass(frozen=True)
 class _Growing(Physics):
+    name: str
+    wheels: Wheels
     per_hour: float
 
     def truth(self) -> Mapping[str, Mapping[str, float]]:
-        return {"radius_drift": {"per_hour": self.per_hour}}
+        return {self.name: {"per_hour": self.per_hour}}
 
     def wheel_angle(self, motion: Motion, angle_rad: WheelPair) -> WheelPair:
         middle_s = 0.5 * (motion.t_s[1:] + motion.t_s[:-1])
@@ -63,4 +93,4 @@ class _Growing(Physics):
         def turned(rad: Floats) -> Floats:
             return np.asarray(rad[0] + np.concatenate(([0.0], np.cumsum(np.diff(rad) / radius_ratio))))
 
-        return WheelPair(left=turned(angle_rad.left), right=turned(angle_rad.right))
+        return wheels_turned(self.wheels, angle_rad, turned)

@@ -97,3 +97,17 @@ def test_the_sigma_of_a_shape_is_that_of_the_parabola_however_coarse_the_points(
 
 def test_a_shape_without_a_top_has_no_sigma():
     assert np.isnan(shape_sigma(np.array([1.0, 2.0, 3.0]), np.array([0.0, -1.0, 0.0])))
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value"),
+    [
+        ("radius_step_left=-0.03,100", "radius_step_left", -0.03),
+        ("radius_step_right=0.02,100", "radius_step_right", 0.02),
+        ("track_step=-0.15,90", "track_step", -0.15),
+    ],
+)
+def test_a_step_is_told_of_the_wheel_or_the_track_that_has_it(text, name, value):
+    one = best(text)
+    assert one.free.effect.name == name
+    assert abs(one.values[0] - value) < 4.0 * one.sigmas[0]

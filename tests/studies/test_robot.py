@@ -218,6 +218,21 @@ def test_radii_drift_step_and_wobble() -> None:
     assert np.allclose(left_m, robot.radius_left_m * np.diff(angle) * wobble, atol=1e-6)
 
 
+def test_one_wheel_changes_alone_and_so_does_the_track() -> None:
+    log = simulated(radius_step_right={"ratio": -0.04, "at_s": 70.0}, radius_drift_left={"per_hour": 0.6})
+    robot, t_s = log.scenario.robot, log.motion.t_s[:-1] + 0.5 * STEP_S
+    along_m, _, turn = body_steps(log)
+    right_m, left_m = (along_m + side * 0.5 * robot.track_m * turn for side in (1.0, -1.0))
+    stepped = np.where(t_s > 70.0, 0.96, 1.0)
+    grown = 1.0 + 0.6 * np.maximum(t_s, 0.0) / 3600.0
+    assert np.allclose(right_m, robot.radius_right_m * np.diff(log.motion.right_rad) * stepped, atol=1e-6)
+    assert np.allclose(left_m, robot.radius_left_m * np.diff(log.motion.left_rad) * grown, atol=1e-6)
+    wide = simulated(track_step={"ratio": 0.2, "at_s": 70.0})
+    told_m, told_turn = told_steps(wide)
+    assert np.allclose(body_steps(wide)[0], told_m, atol=1e-7)
+    assert np.allclose(body_steps(wide)[2], told_turn / np.where(t_s > 70.0, 1.2, 1.0), atol=1e-9)
+
+
 def test_counters_lose_counts_only_above_a_wheel_speed() -> None:
     log = simulated(missed_right={"ratio": 0.1, "above_radps": 8.0})
     right_rad, left_rad = told_angles_rad(log.motion, log.scenario.robot, log.scenario.effects)
