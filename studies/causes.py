@@ -33,7 +33,7 @@ CLASHES = (
     {"speed_offset", "eccentric_right"},
     *({f"{what}{one}", f"{what}{other}"} for what in ("radius_drift", "radius_step") for one, other in SIDES),
 )
-"""Pairs without a meaning: an eccentric wheel's angle has to be counted whole, and both wheels' shares are also one's."""
+"""Pairs without a meaning: an eccentric wheel's angle has to be counted whole, and what one wheel has both have too."""
 COLUMN_SIZES = {
     "motor_current_a": 1.8,
     "ambient_c": 3.5,
