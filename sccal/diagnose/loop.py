@@ -225,19 +225,24 @@ def _take_back(loop: Loop) -> None:
         rest = [one for one in loop.model.accepted if one.key not in gone]
         loop.model = refitted(loop.model, rest, reach=reach)
     if not whole:
-        _refine_again(loop)
+        refine_again(loop)
 
 
-def _refine_again(loop: Loop) -> None:
+def refine_again(loop: Loop) -> None:
     """Time constants and thresholds without what was left out, where the model is likelier with them and all holds."""
-    before = list(loop.model.accepted)
-    better = _with_shapes(loop, before)
-    if [one.key for one in better] == [one.key for one in before]:
+    kept = list(loop.model.accepted)
+    better = _with_shapes(loop, kept)
+    if [one.key for one in better] == [one.key for one in kept]:
         return
     model = refitted(loop.model, better, reach=Reach.NEAR)
     sized = sized_of(model)
     if model.nll < loop.model.nll and all(one.stays for one in sized):
         loop.model, loop.sized = model, sized
+        # What else competes is asked beside the new forms: the posterior knows effects by their shapes.
+        new = {one.free.effect.name: one for one in better if one.run is None}
+        before = loop.saturated.model.accepted
+        rivals = [one if one.run is not None else new.get(one.free.effect.name, one) for one in before]
+        loop.saturated = saturate(model, rivals, _prices(rivals), None, _noises(loop.saturated))
 
 
 def need_more(loop: Loop, needed_nats: float) -> None:
