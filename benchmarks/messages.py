@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from benchmarks.timing import head, show, timed
-from sccal.logs.mcap_write import write_mcap
+from sccal.logs.messages.write import write_mcap
 from sccal.logs.run import RunSource, read_run
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file

@@ -26,7 +26,7 @@ from sccal.errors import DataError, SccalError
 from sccal.logs.ahrs import read_ahrs
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
-from sccal.logs.mcap_run import read_message_log
+from sccal.logs.messages.read import read_message_log
 from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.options import ReadOptions
 from sccal.logs.reference import MANIFEST_FILE, read_reference, read_reference_rows

@@ -14,8 +14,8 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 
-from sccal.logs.mcap_definitions import full_text
-from sccal.logs.mcap_write import Stamped, imu, joint_states, nav_sat_fixes, sentences
+from sccal.logs.messages.definitions import full_text
+from sccal.logs.messages.write import Stamped, imu, joint_states, nav_sat_fixes, sentences
 from sccal.logs.run import RunSource, read_run
 from sccal.logs.streams import Run
 

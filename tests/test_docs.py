@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from sccal.cli import main
-from sccal.logs.mcap_write import write_mcap
+from sccal.logs.messages.write import write_mcap
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
 from tests.compare.test_diagnoses import diagnosis, finding

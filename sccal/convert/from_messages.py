@@ -11,9 +11,9 @@ from sccal.convert.from_folder import nmea_lines
 from sccal.convert.tables import LogTable, RunTables
 from sccal.logs.ahrs import AHRS_COLUMNS
 from sccal.logs.encoder import TRAVEL_UNKNOWN
-from sccal.logs.mcap_heading import in_convention
-from sccal.logs.mcap_run import read_tables
-from sccal.logs.mcap_tables import TableNote
+from sccal.logs.messages.converted import TableNote
+from sccal.logs.messages.heading import in_convention
+from sccal.logs.messages.read import read_tables
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream

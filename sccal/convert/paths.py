@@ -21,8 +21,8 @@ from sccal.convert.tables import NOTE_FILE, RunTables
 from sccal.convert.to_folder import write_folder_of
 from sccal.convert.to_mcap import LIBRARY, write_mcap_of
 from sccal.errors import DataError, Failure, SccalError, UsageError
-from sccal.logs.mcap_file import library_of
-from sccal.logs.mcap_tables import SCHEMA
+from sccal.logs.messages.converted import SCHEMA
+from sccal.logs.messages.mcap_file import library_of
 from sccal.logs.options import ReadOptions
 from sccal.logs.outputs import each_run, require_apart, vehicle_place
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside

@@ -10,7 +10,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
-from sccal.logs.mcap_write import nanoseconds_of
+from sccal.logs.messages.write import nanoseconds_of
 from sccal.logs.streams import Notice, Vehicle
 
 MOST_PLACES = 9

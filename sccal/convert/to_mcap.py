@@ -2,7 +2,8 @@
 
 ``/joint_states`` (JointState: wheel angles, counts turned into radians), ``/imu/data`` (Imu), ``/nmea_sentence``
 (nmea_msgs/Sentence, every line) or ``/fix`` (NavSatFix), and ``/encoder/…``, ``/ahrs/…``, ``/gnss/…`` (Float64):
-further columns, and those that cannot be had back from the standard message bit by bit. See ``sccal.logs.mcap_tables``.
+further columns, and those that cannot be had back from the standard message bit by bit: see
+``sccal.logs.messages.converted``.
 """
 
 from __future__ import annotations
@@ -15,8 +16,16 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats
 from sccal.convert.tables import LogTable, NmeaLines, RunTables, stamps_of, time_places
-from sccal.logs.mcap_tables import CONVERTED, LEFT_JOINT, RIGHT_JOINT, ConversionNote, TableKind, TableNote, recovered
-from sccal.logs.mcap_write import (
+from sccal.logs.messages.converted import (
+    CONVERTED,
+    LEFT_JOINT,
+    RIGHT_JOINT,
+    ConversionNote,
+    TableKind,
+    TableNote,
+    recovered,
+)
+from sccal.logs.messages.write import (
     FIX_TOPIC,
     HEADING_TOPIC,
     NMEA_TOPIC,

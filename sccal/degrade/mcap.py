@@ -14,10 +14,10 @@ from sccal.degrade.mcap_patch import Patcher
 from sccal.degrade.mcap_records import Change, channels_of, rewritten_mcap
 from sccal.degrade.reference import reference_text
 from sccal.errors import DataError, UsageError
-from sccal.logs.mcap_file import Channel, read_mcap
-from sccal.logs.mcap_layout import MalformedError
-from sccal.logs.mcap_tables import note_of
-from sccal.logs.mcap_topics import Topics
+from sccal.logs.messages.converted import note_of
+from sccal.logs.messages.layout import MalformedError
+from sccal.logs.messages.mcap_file import Channel, read_mcap
+from sccal.logs.messages.topics import Topics
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
 from sccal.logs.run import RunSource
 from sccal.logs.write import write_bytes

@@ -12,10 +12,10 @@ from sccal.arrays import Floats, Ints
 from sccal.degrade.faults import Faults, drift_deg, dropped_rows, fault_fixes
 from sccal.degrade.nmea import degrade_nmea
 from sccal.errors import DataError
-from sccal.logs.mcap_fixes import has_positions, lines_of_sentences
-from sccal.logs.mcap_heading import has_orientation
-from sccal.logs.mcap_tables import ConversionNote
-from sccal.logs.mcap_topics import FIELDS, Messages, normal_path
+from sccal.logs.messages.converted import ConversionNote
+from sccal.logs.messages.fixes import has_positions, lines_of_sentences
+from sccal.logs.messages.heading import has_orientation
+from sccal.logs.messages.topics import FIELDS, Messages, normal_path
 from sccal.logs.quality import navsat_status, quality_of
 from sccal.logs.reference import ReferenceRows
 from sccal.logs.streams import Convention

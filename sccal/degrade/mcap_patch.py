@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from sccal.logs.mcap_file import Channel
-from sccal.logs.mcap_json import found_ways
-from sccal.logs.mcap_layout import MalformedError, Shape
-from sccal.logs.mcap_protobuf import ProtobufWalker, appended
-from sccal.logs.mcap_topics import normal_path, walker_of
+from sccal.logs.messages.json_values import found_ways
+from sccal.logs.messages.layout import MalformedError, Shape
+from sccal.logs.messages.mcap_file import Channel
+from sccal.logs.messages.protobuf import ProtobufWalker, appended
+from sccal.logs.messages.topics import normal_path, walker_of
 
 _KEPT = 64
 

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from sccal.errors import DataError
-from sccal.logs.mcap_chunks import DamagedError, decompressed
-from sccal.logs.mcap_file import Channel
-from sccal.logs.mcap_magic import MAGIC
+from sccal.logs.messages.mcap_chunks import DamagedError, decompressed
+from sccal.logs.messages.mcap_file import Channel
+from sccal.logs.messages.mcap_magic import MAGIC
 
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
 _ATTACHMENT_INDEX, _STATISTICS, _METADATA_INDEX = 10, 11, 13

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sccal.errors import DataError
-from sccal.logs.mcap_magic import require_mcap
+from sccal.logs.messages.mcap_magic import require_mcap
 
 LINE_LIMIT_BYTES = 64 * 1024
 COLUMN_LIMIT = 1000

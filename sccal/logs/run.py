@@ -9,11 +9,11 @@ from pathlib import Path
 
 from sccal.errors import DataError, Failure, UsageError
 from sccal.logs.ahrs import read_ahrs
-from sccal.logs.bags import bag_folder_files
 from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
-from sccal.logs.mcap_file import RESULT_LIBRARY, library_of
-from sccal.logs.mcap_run import MESSAGE_SUFFIXES, read_message_log
+from sccal.logs.messages.bags import bag_folder_files
+from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
+from sccal.logs.messages.read import MESSAGE_SUFFIXES, read_message_log
 from sccal.logs.names import natural_key
 from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.options import ReadOptions

@@ -115,7 +115,7 @@ def rich(run: Run, compression: CompressionType) -> bytes:
     writer = Writer(file, chunk_size=20_000, compression=compression, enable_data_crcs=True)
     writer.start(profile="ros2", library="test")
     writer.add_metadata("made", {"by": "a test"})
-    from sccal.logs.mcap_definitions import full_text
+    from sccal.logs.messages.definitions import full_text
 
     channels: dict[str, int] = {}
     camera = writer.register_channel("/camera", "jpeg", 0, {"lens": "wide"})

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sccal.errors import DataError, SccalError
-from sccal.logs.mcap_chunks import DamagedError, decompressed
+from sccal.logs.messages.mcap_chunks import DamagedError, decompressed
 from sccal.logs.streams import Run
 from tests.message_logs import (
     LZ4,

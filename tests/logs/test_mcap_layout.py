@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.logs.mcap_definitions import known_definitions, parse_definitions
-from sccal.logs.mcap_json import JsonGatherer
-from sccal.logs.mcap_layout import Gatherer, MalformedError, Part, Picked
-from sccal.logs.mcap_protobuf import ProtobufWalker, parse_descriptors
-from sccal.logs.mcap_ros import RosWalker
+from sccal.logs.messages.definitions import known_definitions, parse_definitions
+from sccal.logs.messages.json_values import JsonGatherer
+from sccal.logs.messages.layout import Gatherer, MalformedError, Part, Picked
+from sccal.logs.messages.protobuf import ProtobufWalker, parse_descriptors
+from sccal.logs.messages.ros import RosWalker
 from tests.message_logs import as_dict, cdr, decoded, fill, proto_classes
 
 JOINTS = "sensor_msgs/msg/JointState"

@@ -21,10 +21,10 @@ from sccal.align import align
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.single import calibrate_run
 from sccal.errors import DataError, UsageError
-from sccal.logs.mcap_definitions import full_text
-from sccal.logs.mcap_heading import euler
-from sccal.logs.mcap_topics import seconds_of
-from sccal.logs.mcap_write import nanoseconds_of, write_mcap
+from sccal.logs.messages.definitions import full_text
+from sccal.logs.messages.heading import euler
+from sccal.logs.messages.topics import seconds_of
+from sccal.logs.messages.write import nanoseconds_of, write_mcap
 from sccal.logs.options import ReadOptions
 from sccal.logs.quality import quality_of
 from sccal.logs.run import discover, read_run

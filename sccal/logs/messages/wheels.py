@@ -11,7 +11,7 @@ import numpy as np
 from sccal.arrays import Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.encoder import repaired_wheels
-from sccal.logs.mcap_topics import Messages
+from sccal.logs.messages.topics import Messages
 from sccal.logs.options import ReadOptions
 from sccal.logs.streams import Notice, Vehicle, WheelStream
 from sccal.logs.table import Table

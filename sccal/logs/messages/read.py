@@ -11,11 +11,11 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.logs.ahrs import heading_of_table
-from sccal.logs.bags import BAG_SUFFIXES, read_bag
 from sccal.logs.encoder import repaired_wheels
 from sccal.logs.gnss_csv import fixes_of_table
-from sccal.logs.mcap_file import read_mcap
-from sccal.logs.mcap_fixes import (
+from sccal.logs.messages.bags import BAG_SUFFIXES, read_bag
+from sccal.logs.messages.converted import ConversionNote, TableKind, note_of, table_of
+from sccal.logs.messages.fixes import (
     fixes_of_positions,
     fixes_of_sentences,
     has_headings,
@@ -23,10 +23,10 @@ from sccal.logs.mcap_fixes import (
     heading_of_sentences,
     lines_of_sentences,
 )
-from sccal.logs.mcap_heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
-from sccal.logs.mcap_tables import ConversionNote, TableKind, note_of, table_of
-from sccal.logs.mcap_topics import FIELDS, Messages, Topics
-from sccal.logs.mcap_wheels import (
+from sccal.logs.messages.heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
+from sccal.logs.messages.mcap_file import read_mcap
+from sccal.logs.messages.topics import FIELDS, Messages, Topics
+from sccal.logs.messages.wheels import (
     joint_names,
     joints_of,
     of_messages,

@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
-from sccal.logs.mcap_definitions import known_definitions, parse_definitions, plain_name
-from sccal.logs.mcap_file import Channel
-from sccal.logs.mcap_json import JsonGatherer
-from sccal.logs.mcap_layout import Bytes, Gatherer, MalformedError, Picked, Walker
-from sccal.logs.mcap_protobuf import ProtobufWalker, parse_descriptors
-from sccal.logs.mcap_ros import RosWalker
+from sccal.logs.messages.definitions import known_definitions, parse_definitions, plain_name
+from sccal.logs.messages.json_values import JsonGatherer
+from sccal.logs.messages.layout import Bytes, Gatherer, MalformedError, Picked, Walker
+from sccal.logs.messages.mcap_file import Channel
+from sccal.logs.messages.protobuf import ProtobufWalker, parse_descriptors
+from sccal.logs.messages.ros import RosWalker
 from sccal.logs.options import TimeSource
 from sccal.logs.streams import Notice
 
@@ -192,7 +192,7 @@ class Topics:
     ) -> tuple[dict[str, Messages], list[Notice]]:
         """The messages of every topic that was opened and has any, and what could not be read.
 
-        ``log_ahead_ns`` is how far the log times are ahead of the logging computer's clock (see mcap_tables).
+        ``log_ahead_ns`` is how far the log times are ahead of the logging computer's clock (see ``converted``).
         """
         found: dict[str, Messages] = {}
         notices = [

@@ -10,8 +10,8 @@ import contextlib
 import struct
 from dataclasses import dataclass
 
-from sccal.logs.mcap_definitions import Definitions, FieldDefinition
-from sccal.logs.mcap_layout import MOST_FIELDS, MalformedError, Place, Shape
+from sccal.logs.messages.definitions import Definitions, FieldDefinition
+from sccal.logs.messages.layout import MOST_FIELDS, MalformedError, Place, Shape
 
 _CODES = {
     "bool": "u1",

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from sccal.arrays import Ints
-from sccal.logs.mcap_layout import MOST_COLUMNS, MOST_FIELDS, Bytes, Part, Picker
+from sccal.logs.messages.layout import MOST_COLUMNS, MOST_FIELDS, Bytes, Part, Picker
 
 _Way = tuple[str | int, ...]
 _DEEPEST = 24

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from sccal.arrays import Ints
 from sccal.errors import DataError
-from sccal.logs.mcap_chunks import DamagedError, decompressed
-from sccal.logs.mcap_magic import MAGIC, require_mcap
+from sccal.logs.messages.mcap_chunks import DamagedError, decompressed
+from sccal.logs.messages.mcap_magic import MAGIC, require_mcap
 from sccal.logs.streams import Notice
 
 Bytes = NDArray[np.uint8]

@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.logs.mcap_heading import euler, in_convention
-from sccal.logs.mcap_topics import Messages
+from sccal.logs.messages.heading import euler, in_convention
+from sccal.logs.messages.topics import Messages
 from sccal.logs.quality import quality_of
 from sccal.logs.streams import Convention, Notice
 from sccal.logs.table import Table

@@ -13,8 +13,8 @@ import numpy as np
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.limits import ANGLE_LIMIT_RAD, SIGMA_LIMIT_RAD, TURN_RATE_LIMIT_RADPS
-from sccal.logs.mcap_topics import Messages
-from sccal.logs.mcap_wheels import of_messages
+from sccal.logs.messages.topics import Messages
+from sccal.logs.messages.wheels import of_messages
 from sccal.logs.streams import Convention, HeadingStream, Notice, Vehicle
 from sccal.logs.timeline import order_in_time
 

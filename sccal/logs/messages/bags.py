@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sccal.errors import DataError
-from sccal.logs.mcap_file import Channel, OpenChannel, Sink
+from sccal.logs.messages.mcap_file import Channel, OpenChannel, Sink
 from sccal.logs.streams import Notice
 
 BAG_SUFFIXES = (".db3", ".bag")

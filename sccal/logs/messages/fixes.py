@@ -7,8 +7,8 @@ import numpy as np
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
-from sccal.logs.mcap_topics import STAMPED, Messages
-from sccal.logs.mcap_wheels import of_messages
+from sccal.logs.messages.topics import STAMPED, Messages
+from sccal.logs.messages.wheels import of_messages
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
 from sccal.logs.quality import quality_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from sccal.arrays import Floats, Ints
 from sccal.errors import DataError
-from sccal.logs.mcap_definitions import full_text, known_definitions
-from sccal.logs.mcap_ros import RosWalker
-from sccal.logs.mcap_tables import LEFT_JOINT, RIGHT_JOINT
+from sccal.logs.messages.converted import LEFT_JOINT, RIGHT_JOINT
+from sccal.logs.messages.definitions import full_text, known_definitions
+from sccal.logs.messages.ros import RosWalker
 from sccal.logs.quality import navsat_status
 from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream
 

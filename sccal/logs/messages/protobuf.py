@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from sccal.logs.mcap_layout import MOST_FIELDS, MalformedError, Place, Shape
+from sccal.logs.messages.layout import MOST_FIELDS, MalformedError, Place, Shape
 
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _STRING, _MESSAGE, _BYTES_FIELD = 9, 11, 12
