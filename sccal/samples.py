@@ -8,6 +8,8 @@ from tempfile import TemporaryDirectory
 
 from sccal.convert.from_folder import tables_of_folder
 from sccal.convert.to_mcap import write_mcap_of
+from sccal.logs.formats import MCAP
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.run import RunSource
 from sccal.simulate.files import sample_settings, write_run, write_samples
 from sccal.simulate.run import simulate_run
@@ -22,9 +24,9 @@ def write_all_samples(folder: Path) -> None:
     with TemporaryDirectory() as temporary:
         run = Path(temporary) / MCAP_SAMPLE
         write_run(simulate_run(_mcap_settings()), run)
-        tables = tables_of_folder(RunSource(MCAP_SAMPLE, run, folder / "vehicle.toml"))
+        tables = tables_of_folder(RunSource(MCAP_SAMPLE, run, folder / VEHICLE_FILE))
         # Not compressed: compressors of other versions give other bytes.
-        write_mcap_of(tables, folder / f"{MCAP_SAMPLE}.mcap", compression="")
+        write_mcap_of(tables, folder / f"{MCAP_SAMPLE}{MCAP.suffix}", compression="")
         (folder / f"{MCAP_SAMPLE}.truth.json").write_bytes((run / "truth.json").read_bytes())
 
 

@@ -47,6 +47,12 @@ MAY_IMPORT = {
 """Rooms that may use less than all the floors below: what makes or spoils logs shares nothing with what learns, and
 what works on written results needs their files only."""
 MUST_NOT_IMPORT = {"report": {"scipy", "numba"}, "cli": {"numpy", "pandas", "numba", "scipy", "matplotlib"}}
+FILE_NAMES = re.compile(
+    r"\b(encoder\.csv|ahrs\.csv|gnss\.(nmea|csv)|vehicle\.toml|metadata\.yaml)\b|(?<![\w*])\.(mcap|db3|bag)\b"
+)
+SPELL_FILE_NAMES = {"logs/names.py", "logs/formats.py"}
+SAY_VEHICLE_TOML = {"batch/remote.py", "gates/baseline.py", "report/inspect_lines.py"}
+"""Modules that spell no other name, and this one in what they say or look for."""
 LONGEST_MODULE = 600
 NAMES_OF_NOTHING = {"utils", "util", "helpers", "helper", "common", "misc"}
 
@@ -171,6 +177,24 @@ def test_what_a_room_must_not_import(path):
 @each_module
 def test_figures_are_drawn_without_pyplot(path):
     assert not [name for _, name in imported(parsed(path)) if name.startswith("matplotlib.pyplot")]
+
+
+def texts(tree: ast.Module) -> Iterator[str]:
+    """Every text in some code, but for docstrings."""
+    said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    yield from (
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said
+    )
+
+
+@each_module
+def test_names_of_a_logs_files_are_spelled_in_one_place(path):
+    place = path.relative_to(PACKAGE).as_posix()
+    spelled = {found[0] for text in texts(parsed(path)) for found in FILE_NAMES.finditer(text)}
+    if place not in SPELL_FILE_NAMES:
+        assert spelled <= ({"vehicle.toml"} if place in SAY_VEHICLE_TOML else set())
 
 
 @pytest.mark.parametrize("start", ["import sccal", "import sccal.cli"])

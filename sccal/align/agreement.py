@@ -17,6 +17,7 @@ from sccal.align.path import laid_out
 from sccal.align.signs import slope_through_origin, wheel_turn
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.names import ENCODER_FILE
 from sccal.logs.streams import Notice
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def _yaw_against_wheels(aligned: Aligned) -> list[Notice]:
     if len(apart) == judged and judged > 1:
         correlation = slope_through_origin(wheels[clear], yaw[clear]).correlation
         raise DataError(
-            f"{aligned.heading_source} and encoder.csv do not turn together (correlation {correlation:+.2f} over "
+            f"{aligned.heading_source} and {ENCODER_FILE} do not turn together (correlation {correlation:+.2f} over "
             f"{int(clear.sum())} s of turning): {advice}"
         )
     what = f"stretches of {CHUNK_S:.0f} s in which yaw and wheels do not turn together: {advice}"

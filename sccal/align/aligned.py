@@ -37,6 +37,7 @@ from sccal.align.standing import Spans, dither_rad, standing_spans
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
+from sccal.logs.names import AHRS_FILE
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.windows import Window, windows_on_clock, within
 
@@ -99,7 +100,7 @@ class Aligned:
     """The log's further columns by name; where two files share a name, the later one's carries its file's."""
     reference: ReferenceFixes | None = None
     """Fixes that judge and never teach; None where all fixes teach."""
-    heading_source: str = "ahrs.csv"
+    heading_source: str = AHRS_FILE
     """Where the heading comes from, for messages."""
     heading_convention: Convention | None = None
     """Of the source, where it has one of its own; None where vehicle.toml declares it."""

@@ -18,6 +18,7 @@ from sccal.align.clock_search import Lag, find_lags
 from sccal.align.clocks import Clock
 from sccal.arrays import Floats
 from sccal.errors import DataError
+from sccal.logs.names import ENCODER_FILE
 from sccal.logs.streams import Notice
 
 LATENCY_S = 0.3
@@ -212,7 +213,7 @@ def _one_of(
         return together, [Notice("gnss", what, len(good))]
     if not overlap:
         raise DataError(
-            f"the fixes and encoder.csv share no time as logged, and the drive repeats itself: {len(good)} offsets "
+            f"the fixes and {ENCODER_FILE} share no time as logged, and the drive repeats itself: {len(good)} offsets "
             f"between their clocks fit equally well ({others}): log the receive time before each NMEA line, "
             "or stand still once in a while"
         )

@@ -17,6 +17,7 @@ import numpy as np
 from sccal.align.receive_times import Delay, fit_delay
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE
 from sccal.logs.streams import FixStream, Notice
 
 DAY_S = 86400.0
@@ -89,12 +90,14 @@ def require_overlap(t_s: Floats, span_s: tuple[float, float], clock: Clock, what
         return
     seen = f"{t_s[0]:.3f} … {t_s[-1]:.3f} s" if t_s.size else "no usable rows"
     advice = (
-        "without receive times before the NMEA lines, t in encoder.csv and ahrs.csv must be Unix time (UTC), "
+        f"without receive times before the NMEA lines, t in {ENCODER_FILE} and {AHRS_FILE} must be Unix time (UTC), "
         "and the motion shows no other offset between the clocks"
         if clock.source == "utc"
         else "all streams must share the logging computer's clock"
     )
-    raise DataError(f"{what} ({seen}) and encoder.csv ({span_s[0]:.3f} … {span_s[1]:.3f} s) do not overlap: {advice}")
+    raise DataError(
+        f"{what} ({seen}) and {ENCODER_FILE} ({span_s[0]:.3f} … {span_s[1]:.3f} s) do not overlap: {advice}"
+    )
 
 
 def _on_the_day_of(time_of_day_s: Floats, span_s: tuple[float, float]) -> Floats:

@@ -15,6 +15,7 @@ import numpy as np
 from sccal.align.path import laid_out
 from sccal.arrays import Complexes, Floats
 from sccal.errors import DataError
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, VEHICLE_FILE
 
 if TYPE_CHECKING:
     from sccal.align.aligned import Aligned
@@ -97,8 +98,8 @@ def _check_that_both_wheels_turn(aligned: Aligned) -> None:
     if max(right, left) > STUCK_TRAVEL_M and min(right, left) < STUCK_SHARE * max(right, left):
         side = "right" if right < left else "left"
         raise DataError(
-            f"encoder.csv: the {side} wheel's counter hardly moves ({min(right, left):.2f} m in all, the other wheel's "
-            f"{max(right, left):.2f} m): check the encoder and the column {side}_ticks"
+            f"{ENCODER_FILE}: the {side} wheel's counter hardly moves ({min(right, left):.2f} m in all, the other "
+            f"wheel's {max(right, left):.2f} m): check the encoder and the column {side}_ticks"
         )
 
 
@@ -118,8 +119,8 @@ def _check_wheel_directions(aligned: Aligned, t_s: Floats, east_m: Floats, north
         side = "left" if turning.value > 0 else "right"
         who, column = f"the {side} wheel", f"{side}_ticks"
     raise DataError(
-        f"encoder.csv: {who} seems to count backwards: over {displacement.size} stretches the fixes move by half the "
-        f"difference of the wheels' travel, not by half their sum; negate {column}"
+        f"{ENCODER_FILE}: {who} seems to count backwards: over {displacement.size} stretches the fixes move by half "
+        f"the difference of the wheels' travel, not by half their sum; negate {column}"
     )
 
 
@@ -159,15 +160,15 @@ def _check_turning(aligned: Aligned) -> None:
         f"correlation {yaw_on_wheels.correlation:+.2f} over {yaw_on_wheels.windows} s)"
     )
     swapped = (
-        "left and right wheels look swapped: exchange left_ticks and right_ticks in encoder.csv (or, if both count "
+        f"left and right wheels look swapped: exchange left_ticks and right_ticks in {ENCODER_FILE} (or, if both count "
         "backwards, negate both)"
     )
     mirrored = (
-        f'set convention = "{other}" under [ahrs] in vehicle.toml (it is "{convention}"), '
+        f'set convention = "{other}" under [ahrs] in {VEHICLE_FILE} (it is "{convention}"), '
         "or, for quaternions in messages, give --orientation ned"
     )
     if aligned.heading_convention is not None:
-        mirrored = f"the headings of {aligned.heading_source} do not turn clockwise from north: write an ahrs.csv"
+        mirrored = f"the headings of {aligned.heading_source} do not turn clockwise from north: write an {AHRS_FILE}"
     if wheels_fit is False and yaw_fits is not False:
         raise DataError(f"{seen}, and the path of the fixes sides with the AHRS: {swapped}")
     if yaw_fits is False and wheels_fit is not False:

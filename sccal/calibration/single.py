@@ -40,6 +40,7 @@ from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem, iterate, likeliest, reported_covariance, reported_values
 from sccal.filter.noise import MISFIT_HZ, Reach, estimate_noise
 from sccal.filter.start import ODD_SCALE, Constants, find_start
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Notice, Run
 
 SETTLED_S = 20.0
@@ -241,7 +242,7 @@ def _doubts(problem: RunProblem, found: ForwardPass) -> list[Notice]:
             f"sign that ticks_per_rev or wheel_radius_m is wrong: at the start the fixes move {scale:.2f} times as far "
             "as the wheels"
         )
-        notices.append(Notice("vehicle.toml", what, 1, "", "warning"))
+        notices.append(Notice(VEHICLE_FILE, what, 1, "", "warning"))
     return notices
 
 

@@ -12,6 +12,7 @@ from sccal.filter.forward import prior_covariance
 from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Vehicle
 
 UNOBSERVED_RATIO = 0.5
@@ -57,7 +58,7 @@ def judge(
             status = "at_bound"
             reason = (
                 f"the {names[k]} comes out at {value / nominal[k]:.2f} times its nominal value, beyond what wear or "
-                "load explain: check ticks_per_rev, wheel_radius_m and track_m in vehicle.toml"
+                f"load explain: check ticks_per_rev, wheel_radius_m and track_m in {VEHICLE_FILE}"
             )
         found.append(Estimate(value, float(sigma[k]), status, reason, float(nominal[k]), float(prior[k])))  # type: ignore[arg-type]
     return Parameters(found[0], found[1], found[2], _judge_offset(float(values[3]), float(sigma[3]), options))

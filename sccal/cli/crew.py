@@ -9,9 +9,10 @@ from pathlib import Path
 
 from sccal.batch.processes import ONE_THREAD, Crew, Here, Processes
 from sccal.errors import UsageError
+from sccal.logs.formats import MESSAGE_SUFFIXES, RUN_FILES
+from sccal.logs.names import BAG_FILE
 
-_RUN_FILES = {"encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv", "metadata.yaml"}
-_RUN_SUFFIXES = (".mcap", ".db3", ".bag")
+_RUN_FILES = {*RUN_FILES, BAG_FILE}
 _MOST_FOLDERS = 10_000
 _SHORT_BYTES = 4_000_000
 """Of the files of a run of five minutes or so."""
@@ -59,7 +60,7 @@ def at_sight(paths: Sequence[Path | str], most: int) -> tuple[int, int]:
         walk = [(str(path.parent), [], [path.name])] if path.is_file() else os.walk(path)
         for folder, below, files in walk:
             below[:] = [name for name in below if not name.startswith(".")]
-            messages = [name for name in files if name.lower().endswith(_RUN_SUFFIXES)]
+            messages = [name for name in files if name.lower().endswith(MESSAGE_SUFFIXES)]
             count += not _RUN_FILES.isdisjoint(files)
             count += len(messages)
             for name in [*messages, *_RUN_FILES.intersection(files)]:

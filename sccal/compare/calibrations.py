@@ -7,6 +7,7 @@ from typing import Any
 
 from sccal.compare.pairs import pairs_of
 from sccal.compare.result import Comparison, Figure, Side
+from sccal.logs.names import VEHICLE_FILE
 from sccal.results.saved import Saved
 
 FIGURES = (
@@ -20,7 +21,7 @@ FIGURES = (
     "outage.end_rms_m",
     "outage.percent_of_distance",
 )
-NOT_DATA = ("vehicle.toml",)
+NOT_DATA = (VEHICLE_FILE,)
 """Inputs that results may share and still be of different data."""
 
 

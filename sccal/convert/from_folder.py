@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from sccal.errors import DataError
 from sccal.logs.ahrs import ahrs_table
 from sccal.logs.encoder import encoder_table
 from sccal.logs.gnss_csv import gnss_table
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
 from sccal.logs.nmea.sentences import find_sentences
 from sccal.logs.nmea.times import date_sentences
 from sccal.logs.run import RunSource, read_run, vehicle_of
@@ -32,17 +34,17 @@ def tables_of_folder(source: RunSource) -> RunTables:
     Raises:
         DataError: a file is missing or cannot be used.
     """
-    run = read_run(source)
-    folder = source.path
+    run, listed, folder = read_run(source), source.folder, source.path
+    assert listed is not None
     notices = earlier_notices(folder)
-    encoder = _log_table(encoder_table(folder / "encoder.csv"), folder / "encoder.csv", notices)
+    encoder = _log_table(encoder_table, folder / ENCODER_FILE, notices)
     ahrs = gnss = nmea = None
-    if (folder / "ahrs.csv").is_file():
-        ahrs = _log_table(ahrs_table(folder / "ahrs.csv"), folder / "ahrs.csv", notices)
-    if (folder / "gnss.nmea").is_file():
-        nmea = nmea_lines((folder / "gnss.nmea").read_bytes(), encoder.t_s, folder / "gnss.nmea", notices)
+    if AHRS_FILE in listed.there:
+        ahrs = _log_table(ahrs_table, folder / AHRS_FILE, notices)
+    if listed.fix_file == NMEA_FILE:
+        nmea = nmea_lines((folder / NMEA_FILE).read_bytes(), encoder.t_s, folder / NMEA_FILE, notices)
     else:
-        gnss = _log_table(gnss_table(folder / "gnss.csv"), folder / "gnss.csv", notices)
+        gnss = _log_table(gnss_table, folder / GNSS_FILE, notices)
     return RunTables(
         name=source.name,
         path=folder,
@@ -65,7 +67,8 @@ def earlier_notices(folder: Path) -> list[Notice]:
         return []
 
 
-def _log_table(table: Table, path: Path, notices: list[Notice]) -> LogTable:
+def _log_table(read: Callable[[Path], Table], path: Path, notices: list[Notice]) -> LogTable:
+    table = read(path)
     notices += [notice for notice in table.notices if notice.severity == "warning" or notice.doubt]
     columns = {name: column for name, column in table.columns.items() if name != "t"}
     for better, other in (("yaw_deg", "yaw_rad"), ("left_ticks", "left_rad"), ("right_ticks", "right_rad")):

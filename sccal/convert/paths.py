@@ -21,12 +21,13 @@ from sccal.convert.tables import NOTE_FILE, RunTables
 from sccal.convert.to_folder import write_folder_of
 from sccal.convert.to_mcap import LIBRARY, write_mcap_of
 from sccal.errors import DataError, Failure, SccalError, UsageError
+from sccal.logs.formats import MCAP, RUN_FILES, message_format
 from sccal.logs.messages.converted import SCHEMA
 from sccal.logs.messages.mcap_file import library_of
 from sccal.logs.options import ReadOptions
 from sccal.logs.outputs import each_run, require_apart, vehicle_place
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
-from sccal.logs.run import RUN_FILES, RunSource, find_runs, is_bag_folder, is_message_file, vehicle_of
+from sccal.logs.run import RunSource, find_runs, vehicle_of
 from sccal.logs.streams import Notice
 from sccal.logs.write import write_bytes
 
@@ -67,17 +68,14 @@ def convert_paths(
 
 
 def _other_form(source: RunSource) -> Form:
-    return "folder" if source.path.suffix.lower() == ".mcap" and source.path.is_file() else "mcap"
+    return "folder" if message_format(source.path) is MCAP else "mcap"
 
 
 def _convert(source: RunSource, out: Path, form: Form, options: ReadOptions, inputs: Collection[Path]) -> ConvertedRun:
     target = _target(source, out, form)
     if target.resolve() in inputs:
         raise UsageError(f"--out {out}: {target} is one of the logs to convert; name another folder")
-    if is_message_file(source.path) or is_bag_folder(source.path):
-        tables = tables_of_messages(source, options)
-    else:
-        tables = tables_of_folder(source)
+    tables = tables_of_messages(source, options) if source.folder is None else tables_of_folder(source)
     try:
         write = _into_mcap if form == "mcap" else _into_folder
         write(tables, source, out, target)
@@ -91,7 +89,7 @@ def _target(source: RunSource, out: Path, form: Form) -> Path:
     if form == "folder":
         return out / source.name
     _, own = vehicle_place(source, out, out / source.name)
-    return out / source.name / f"{Path(source.name).name}.mcap" if own else out / f"{source.name}.mcap"
+    return out / source.name / f"{Path(source.name).name}{MCAP.suffix}" if own else out / f"{source.name}{MCAP.suffix}"
 
 
 def _into_mcap(tables: RunTables, source: RunSource, out: Path, target: Path) -> None:

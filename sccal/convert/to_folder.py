@@ -5,18 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from sccal.convert.tables import MOST_PLACES, LogTable, NmeaLines, RunTables, time_places
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
 from sccal.logs.write import write_bytes, write_table
 
 
 def write_folder_of(tables: RunTables, folder: Path) -> None:
     """Write a run's files into a folder that is there."""
-    _write(tables.encoder, folder / "encoder.csv")
+    _write(tables.encoder, folder / ENCODER_FILE)
     if tables.ahrs is not None:
-        _write(tables.ahrs, folder / "ahrs.csv")
+        _write(tables.ahrs, folder / AHRS_FILE)
     if tables.gnss is not None:
-        _write(tables.gnss, folder / "gnss.csv")
+        _write(tables.gnss, folder / GNSS_FILE)
     if tables.nmea is not None:
-        write_bytes(folder / "gnss.nmea", nmea_text(tables.nmea))
+        write_bytes(folder / NMEA_FILE, nmea_text(tables.nmea))
 
 
 def nmea_text(nmea: NmeaLines) -> bytes:

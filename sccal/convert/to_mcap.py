@@ -40,6 +40,7 @@ from sccal.logs.messages.write import (
     sentence_messages,
     write_topics,
 )
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Convention, FixStream, HeadingStream, WheelStream
 
 LIBRARY = "sccal convert"
@@ -57,7 +58,7 @@ def write_mcap_of(tables: RunTables, path: Path, compression: str = "zstd") -> N
     ahead = note.log_ahead_ns
     if ahead:
         topics = [_ahead(topic, ahead) for topic in topics]
-    vehicle = {"vehicle.toml": (_TEXT, tables.vehicle_text)}
+    vehicle = {VEHICLE_FILE: (_TEXT, tables.vehicle_text)}
     write_topics(path, topics, {CONVERTED: note.as_metadata()}, vehicle, compression, LIBRARY)
 
 

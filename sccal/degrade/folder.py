@@ -24,6 +24,8 @@ from sccal.degrade.reference import after_both, reference_text
 from sccal.degrade.sheet import Sheet
 from sccal.degrade.tables import degrade_ahrs_csv, degrade_encoder_csv, degrade_gnss_csv
 from sccal.errors import DataError, UsageError
+from sccal.logs.formats import FIXES
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE, VEHICLE_FILE
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, ReferenceRows, beside, read_reference_rows
 from sccal.logs.run import RunSource
 from sccal.logs.streams import Convention
@@ -31,7 +33,6 @@ from sccal.logs.timeline import order_in_time
 from sccal.logs.vehicle import read_vehicle
 
 SCHEMA = "sccal.degrade/1"
-_FIX_FILES = ("gnss.nmea", "gnss.csv")
 _COPY_BYTES = 1 << 20
 
 
@@ -110,17 +111,12 @@ def _encoder_csv(raw: bytes, task: Task) -> _Changed:
 Rewriter = Callable[[bytes, Task], _Changed]
 
 REWRITERS: Mapping[str, Rewriter] = {
-    "gnss.nmea": _nmea,
-    "gnss.csv": _gnss_csv,
-    "ahrs.csv": _ahrs_csv,
-    "encoder.csv": _encoder_csv,
+    NMEA_FILE: _nmea,
+    GNSS_FILE: _gnss_csv,
+    AHRS_FILE: _ahrs_csv,
+    ENCODER_FILE: _encoder_csv,
 }
-"""By a file's name, or by its suffix for kinds of logs that may have any name."""
-
-
-def rewriter_of(name: str) -> Rewriter | None:
-    """What rewrites a file of that name; None for files that are only copied."""
-    return REWRITERS.get(name) or REWRITERS.get(Path(name).suffix)
+"""By a file's name; all others are only copied."""
 
 
 def degrade_folder(source: RunSource, target: Path, faults: Faults, others: Collection[Path] = ()) -> DegradedRun:
@@ -161,7 +157,7 @@ def _written(source: RunSource, staging: Path, task: Task, others: Collection[Pa
     for relative in _files(source.path, others):
         path, new_path = source.path / relative, staging / relative
         new_path.parent.mkdir(parents=True, exist_ok=True)
-        rewriter = rewriter_of(relative.name) if relative.parent == Path() else None
+        rewriter = REWRITERS.get(relative.name) if relative.parent == Path() else None
         if rewriter is None:
             digest = _copied(path, new_path)
             files.append({"name": relative.as_posix(), "sha256_before": digest, "sha256_after": digest})
@@ -180,7 +176,7 @@ def _written(source: RunSource, staging: Path, task: Task, others: Collection[Pa
         )
         if isinstance(count := changed.did.get("rows_dropped"), int) and count:
             dropped[relative.name] = count
-        if changed.rows is not None and (rows is None or relative.name == _FIX_FILES[0]):
+        if changed.rows is not None and (rows is None or relative.name == NMEA_FILE):
             rows = changed.rows
             fixes = fix_counts(rows, changed.outliers)
     if rows is not None:
@@ -194,7 +190,7 @@ def _written(source: RunSource, staging: Path, task: Task, others: Collection[Pa
 
 def _changed(raw: bytes, path: Path, rewriter: Rewriter, task: Task, notices: list[str]) -> _Changed:
     """What a rewriter makes of a file; a file that no fault concerns may be unreadable."""
-    concerned = task.faults.touch_fixes if path.name in _FIX_FILES else not task.faults.none
+    concerned = task.faults.touch_fixes if path.name in FIXES else not task.faults.none
     try:
         return rewriter(raw, task)
     except DataError as error:
@@ -260,9 +256,9 @@ def manifest_of(
 
 def _require_files(folder: Path, faults: Faults) -> None:
     for wanted, names, what in (
-        (faults.touch_fixes, _FIX_FILES, "faults of the fixes"),
-        (bool(faults.heading_drift_deg_per_hour), ("ahrs.csv",), "--heading-drift"),
-        (bool(faults.encoder_dropout), ("encoder.csv",), "--encoder-dropout"),
+        (faults.touch_fixes, FIXES, "faults of the fixes"),
+        (bool(faults.heading_drift_deg_per_hour), (AHRS_FILE,), "--heading-drift"),
+        (bool(faults.encoder_dropout), (ENCODER_FILE,), "--encoder-dropout"),
     ):
         if wanted and not any((folder / name).is_file() for name in names):
             raise DataError(f"{folder}: lacks {' or '.join(names)}, which {what} would rewrite")
@@ -270,7 +266,7 @@ def _require_files(folder: Path, faults: Faults) -> None:
 
 def _span_s(folder: Path, faults: Faults, notices: list[str]) -> tuple[float, float] | None:
     """First and last time of the encoder file, whatever else it holds; None where there is none."""
-    path = folder / "encoder.csv"
+    path = folder / ENCODER_FILE
     try:
         time = Sheet(path.read_bytes(), path.name).column("t")
         values = time.values[np.isfinite(time.values)] if time is not None else np.empty(0)
@@ -283,7 +279,7 @@ def _span_s(folder: Path, faults: Faults, notices: list[str]) -> tuple[float, fl
     except DataError as error:
         why = str(error)
     if faults.losses_s or faults.from_s is not None:
-        notices.append(f"encoder.csv cannot tell when the run begins ({why}): windows go by the fixes' own times")
+        notices.append(f"{ENCODER_FILE} cannot tell when the run begins ({why}): windows go by the fixes' own times")
     return None
 
 
@@ -293,7 +289,7 @@ def convention_of(source: RunSource, faults: Faults) -> Convention:
         return "enu"
     if source.vehicle_toml is None:
         raise DataError(
-            f"{source.path}: no vehicle.toml here or above, so nobody knows which way its yaw turns; "
+            f"{source.path}: no {VEHICLE_FILE} here or above, so nobody knows which way its yaw turns; "
             'add one with [ahrs] convention = "enu" or "ned"'
         )
     vehicle, _ = read_vehicle(source.vehicle_toml)

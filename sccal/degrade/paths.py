@@ -14,8 +14,10 @@ from sccal.degrade.faults import Faults
 from sccal.degrade.folder import DegradedRun, degrade_folder
 from sccal.degrade.mcap import degrade_mcap
 from sccal.errors import DataError, Failure, SccalError
+from sccal.logs.formats import MCAP, message_format
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.outputs import each_run, require_apart, vehicle_place
-from sccal.logs.run import RunSource, find_runs, is_message_file
+from sccal.logs.run import RunSource, find_runs
 
 
 def degrade_paths(
@@ -36,7 +38,7 @@ def degrade_paths(
     runs = {source.path for source in sources}
 
     def degrade(source: RunSource) -> DegradedRun:
-        if is_message_file(source.path):
+        if message_format(source.path) is not None:
             return _degrade_file(source, out, faults)
         run = degrade_folder(source, out / source.name, faults, runs - {source.path})
         _copy_vehicle(source, out)
@@ -47,7 +49,7 @@ def degrade_paths(
 
 def _degrade_file(source: RunSource, out: Path, faults: Faults) -> DegradedRun:
     suffix = source.path.suffix
-    if suffix.lower() != ".mcap":
+    if message_format(source.path) is not MCAP:
         raise DataError(f"{source.path}: of logs of messages only MCAP is degraded; `sccal convert` makes one of it")
     name = source.name if source.name.endswith(suffix) else source.name + suffix
     place, own = (None, False) if source.vehicle_toml is None else vehicle_place(source, out, out / source.name)
@@ -68,7 +70,7 @@ def _copy_vehicle(source: RunSource, out: Path) -> None:
     name = Path(source.name)
     above = vehicle.parent.relative_to(root).parts if vehicle.parent.is_relative_to(root) else ()
     prefix = len(name.parts) - len(source.path.relative_to(root).parts) if source.path != root else 0
-    own, shared = out / name / "vehicle.toml", out.joinpath(*name.parts[:prefix], *above, "vehicle.toml")
+    own, shared = out / name / VEHICLE_FILE, out.joinpath(*name.parts[:prefix], *above, VEHICLE_FILE)
     if shared.exists() and shared.read_bytes() != text:
         _write(own, text)
         return

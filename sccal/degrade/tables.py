@@ -14,6 +14,7 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.degrade.faults import FaultedFixes, Faults, drift_deg, dropped_rows, fault_fixes
 from sccal.degrade.sheet import Cells, Sheet
 from sccal.errors import DataError
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE
 from sccal.logs.streams import Convention
 
 _POSITION_PLACES = 10
@@ -46,7 +47,7 @@ def degrade_gnss_csv(
         DataError: columns are missing, or no row has a position.
         UsageError: a window outside the run.
     """
-    sheet = Sheet(raw, "gnss.csv")
+    sheet = Sheet(raw, GNSS_FILE)
     sheet.require(("t", "lat_deg", "lon_deg"))
     time, lat, lon = (_present(sheet.column(name)) for name in ("t", "lat_deg", "lon_deg"))
     claimed, sigma, alt = (sheet.column(name) for name in ("fix_quality", "sigma_m", "alt_m"))
@@ -98,7 +99,7 @@ def degrade_ahrs_csv(raw: bytes, faults: Faults, convention: Convention) -> tupl
     Raises:
         DataError: columns are missing, or no row can be read.
     """
-    sheet = Sheet(raw, "ahrs.csv")
+    sheet = Sheet(raw, AHRS_FILE)
     sheet.require(("t", "yaw_deg"), ("t", "yaw_rad"))
     time = _present(sheet.column("t"))
     changed = 0
@@ -135,7 +136,7 @@ def degrade_encoder_csv(raw: bytes, faults: Faults, stream_name: str) -> tuple[b
     Raises:
         DataError: columns are missing.
     """
-    sheet = Sheet(raw, "encoder.csv")
+    sheet = Sheet(raw, ENCODER_FILE)
     names = sheet.require(("t", "left_ticks", "right_ticks"), ("t", "left_rad", "right_rad"))
     readable = np.ones(sheet.line_begin.size, dtype=np.bool_)
     for name in names:

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from sccal import __version__
 from sccal.export.estimates import usable, why_not, with_sigma
 from sccal.export.result import Result
+from sccal.logs.names import VEHICLE_FILE
 from sccal.results.numbers import one_line
 from sccal.results.saved import SavedEstimate
 
@@ -34,7 +35,7 @@ def write_ardupilot(result: Result) -> str:
         f"# Written by sccal {__version__}. X forward, Y right, metres from the middle between the wheels.",
         "# If the origin of your positions is elsewhere, add where that middle is to every _POS_X and _POS_Y.",
         "# WENC is the left wheel's encoder, WENC2 the right wheel's: exchange the two if yours are wired otherwise.",
-        "# WENC_CPR and WENC2_CPR are counts per turn of the wheel: ticks_per_rev in vehicle.toml.",
+        f"# WENC_CPR and WENC2_CPR are counts per turn of the wheel: ticks_per_rev in {VEHICLE_FILE}.",
         *_line("WENC_RADIUS", 1.0, "left radius", parameters["radius_left_m"]),
         *_line("WENC2_RADIUS", 1.0, "right radius", parameters["radius_right_m"]),
         *_line("WENC_POS_Y", -0.5, "minus half of the track,", track),

@@ -20,6 +20,7 @@ from sccal import __version__
 from sccal.export.estimates import usable, why_not, with_sigma
 from sccal.export.result import Result
 from sccal.export.ros2_control import ros_double
+from sccal.logs.names import VEHICLE_FILE
 from sccal.results.numbers import one_line
 from sccal.results.saved import SavedEstimate
 
@@ -66,7 +67,7 @@ def write_robot_localization(result: Result) -> str:
             "    frequency: 30.0",
             "    delay: 3.0  # s; the heading is taken from one IMU message after this: stand still",
             "    # Heading used = imu yaw + magnetic_declination_radians + yaw_offset, counter-clockwise from east.",
-            '    # The IMU message must be enu, as ROS asks: where vehicle.toml says convention = "ned", or the',
+            f'    # The IMU message must be enu, as ROS asks: where {VEHICLE_FILE} says convention = "ned", or the',
             "    # heading is a receiver's (HDT and the like), the driver has to publish 90 deg - yaw.",
             *_offset(saved.parameters["heading_offset_deg"]),
             "    zero_altitude: true",

@@ -10,6 +10,7 @@ from sccal.arrays import Floats
 from sccal.inspect.read import LogStreams
 from sccal.inspect.result import Gap, StreamFacts, StreamName
 from sccal.inspect.together import Together
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE
 from sccal.logs.streams import Notice
 
 GAP_STEPS = 3.0
@@ -29,8 +30,8 @@ def longest_step_s(t_s: Floats) -> float:
 def stream_facts(streams: LogStreams, together: Together) -> tuple[StreamFacts, ...]:
     """Of every stream that is there."""
     facts = []
-    of_heading = "ahrs.csv" if streams.heading is None else streams.heading.source
-    sources: dict[StreamName, str] = {"wheels": "encoder.csv", "heading": of_heading, "fixes": streams.fix_source}
+    of_heading = AHRS_FILE if streams.heading is None else streams.heading.source
+    sources: dict[StreamName, str] = {"wheels": ENCODER_FILE, "heading": of_heading, "fixes": streams.fix_source}
     for name, source in sources.items():
         t_s = together.times(name)
         if t_s.size >= 2:

@@ -14,6 +14,7 @@ from sccal.inspect.place import PlacedFixes
 from sccal.inspect.read import LogStreams
 from sccal.inspect.result import CourseFacts, DriveFacts, Finding, FixFacts, Gap, StreamFacts, Weight, Witness
 from sccal.inspect.together import Together
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Notice
 
 COVERED = 0.9
@@ -33,7 +34,7 @@ _NAMED = {"wheels": "the wheels", "heading": "the heading", "fixes": "the fixes"
 _OTHER_SIGN = {
     "yaw against wheels": "the AHRS convention (enu or ned) is wrong, or left and right wheels are swapped",
     "course of the fixes against wheels": "left and right wheels are swapped, or both count backwards",
-    "course of the fixes against yaw": "the AHRS convention in vehicle.toml (enu or ned) is wrong",
+    "course of the fixes against yaw": f"the AHRS convention in {VEHICLE_FILE} (enu or ned) is wrong",
 }
 
 
@@ -90,7 +91,7 @@ def _of_scale(streams: LogStreams, seen: Sequence[Witness]) -> Iterator[Finding]
             yield Finding(
                 "warning",
                 f"the fixes move {one.slope:.3g} times as far as the wheels: check ticks_per_rev and wheel_radius_m in "
-                "vehicle.toml",
+                f"{VEHICLE_FILE}",
             )
 
 

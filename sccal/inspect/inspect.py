@@ -15,6 +15,7 @@ from sccal.inspect.read import LogStreams, read_streams
 from sccal.inspect.result import ColumnFacts, Excited, Inspection
 from sccal.inspect.together import bring_together
 from sccal.inspect.witnesses import course_facts, witnesses
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, NMEA_FILE
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource
 from sccal.logs.streams import Notice
@@ -88,15 +89,15 @@ def _columns(streams: LogStreams) -> tuple[ColumnFacts, ...]:
     """The further columns; what every receiver says about itself is told with the fixes."""
     found = []
     for source, stream in (
-        ("encoder.csv", streams.wheels),
-        ("ahrs.csv", streams.heading),
+        (ENCODER_FILE, streams.wheels),
+        (AHRS_FILE, streams.heading),
         (streams.fix_source, streams.fixes),
     ):
         if stream is None:
             continue
         for name, values in stream.extras.items():
             shown = range_of(values)
-            if shown is None or (source == "gnss.nmea" and name in _RECEIVER_COLUMNS):
+            if shown is None or (source == NMEA_FILE and name in _RECEIVER_COLUMNS):
                 continue
             found.append(ColumnFacts(source, name, shown, shown.high > shown.low, float(np.isnan(values).mean())))
     return tuple(found)

@@ -16,7 +16,7 @@ from sccal.logs.encoder import read_encoder
 from sccal.logs.gnss_csv import read_gnss_csv
 from sccal.logs.nmea import read_nmea, read_nmea_heading
 from sccal.logs.options import ReadOptions
-from sccal.logs.run import RunSource, is_message_log, read_run
+from sccal.logs.run import RunSource, read_run
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.table import read_table
 from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
@@ -59,7 +59,7 @@ class LogStreams:
 
 def read_streams(source: RunSource, options: ReadOptions | None = None) -> LogStreams:
     """Read whatever can be read of a run. Raises nothing for bad data: it is told in ``unread``."""
-    return _of_messages(source, options) if is_message_log(source.path) else _Folder(source).read()
+    return _of_messages(source, options) if source.folder is None else _Folder(source).read()
 
 
 def _of_messages(source: RunSource, options: ReadOptions | None) -> LogStreams:

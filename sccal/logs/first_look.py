@@ -6,13 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sccal.errors import DataError
-from sccal.logs.messages.mcap_magic import require_mcap
-
-LINE_LIMIT_BYTES = 64 * 1024
-COLUMN_LIMIT = 1000
-CSV_FILES = ("encoder.csv", "ahrs.csv", "gnss.csv")
-_CHUNK_BYTES = 1 << 20
-_BLANKS = b"\0 \t\r\n"
+from sccal.logs.formats import FOLDER_FILES, message_format
 
 
 def require_any_log(paths: Sequence[Path]) -> None:
@@ -28,73 +22,16 @@ def require_any_log(paths: Sequence[Path]) -> None:
 
 
 def require_log(path: Path) -> None:
-    """Look at the beginning of an .mcap file, or of each CSV file of a run's folder.
+    """Look at the beginning of a file of messages, or of each file of a run's folder.
 
     Raises:
-        DataError: a file that is no MCAP file, or no CSV file.
+        DataError: a file that is not of the form that its name says.
     """
-    if path.suffix.lower() == ".mcap" and path.is_file():
-        require_mcap(path)
-    folder = path.parent if path.name in CSV_FILES else path
-    for file in (folder / name for name in CSV_FILES):
-        if file.is_file():
-            _require_csv(file)
-
-
-def split_header(data: bytes, path: Path) -> tuple[list[str], str, int, int]:
-    """Column names, separator, the header's line number from 1, and where the bytes below it begin.
-
-    Raises:
-        DataError: no header, or one that no log has.
-    """
-    start = line = 0
-    while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end
-        line += 1
-        if end - start > LINE_LIMIT_BYTES:
-            raise DataError(
-                f"{path}: line {line} has more than {LINE_LIMIT_BYTES // 1024} kB without a line end; "
-                "this is not a CSV file"
-            )
-        text = data[start:end].decode("utf-8", errors="replace").strip()
-        if text and not text.startswith("#"):
-            break
-        start = end + 1
-    else:
-        raise DataError(
-            f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
-        )
-    separator = next((mark for mark in ",;\t" if mark in text), ",")
-    names = [name.strip().strip('"').strip() for name in text.split(separator)]
-    if len(names) > COLUMN_LIMIT:
-        raise DataError(f"{path}: line {line} names {len(names)} columns, more than {COLUMN_LIMIT}; this is not a log")
-    return names, separator, line, end + 1
-
-
-def blank_file(path: Path, size_bytes: int) -> DataError:
-    """The error of a file without content."""
-    what = "is empty (0 bytes)" if not size_bytes else f"holds nothing but blanks ({size_bytes} bytes)"
-    return DataError(f"{path}: {what}; log it again or remove the run")
-
-
-def is_blank(data: bytes) -> bool:
-    """Whether there is nothing but spaces, line ends and zero bytes."""
-    return not data.strip(_BLANKS)
-
-
-def _require_csv(path: Path) -> None:
-    try:
-        with path.open("rb") as file:
-            begin = file.read(_CHUNK_BYTES)
-            if is_blank(begin):
-                if all(is_blank(chunk) for chunk in iter(lambda: file.read(_CHUNK_BYTES), b"")):
-                    raise blank_file(path, path.stat().st_size)
-                return
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
-    if begin.startswith((b"\xff\xfe", b"\xfe\xff")) or (b"\n" not in begin and b"\r" in begin):
-        return  # for the reader of tables to say, or to take
-    if len(begin) == _CHUNK_BYTES:
-        begin += b"\nt"  # where all of it is comments, the header comes later
-    split_header(begin, path)
+    messages = message_format(path)
+    if messages is not None and messages.look is not None:
+        messages.look(path)
+    looks = {one.name: one.look for one in FOLDER_FILES if one.look is not None}
+    folder = path.parent if path.name in looks else path
+    for name, look in looks.items():
+        if (folder / name).is_file():
+            look(folder / name)

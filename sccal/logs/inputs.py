@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sccal.errors import DataError
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
-from sccal.logs.run import RUN_FILES, RunSource, is_message_log
+from sccal.logs.run import RunSource
 
 
 @dataclass(frozen=True)
@@ -43,10 +43,10 @@ def input_paths(source: RunSource) -> Iterator[tuple[str, Path]]:
     run = source.path
     if run.is_file():
         yield run.name, run
-    elif is_message_log(run):
+    elif source.folder is None:
         yield from ((path.relative_to(run).as_posix(), path) for path in sorted(run.rglob("*")) if path.is_file())
     else:
-        yield from ((name, run / name) for name in RUN_FILES if (run / name).is_file())
+        yield from ((name, run / name) for name in source.folder.there)
     if source.vehicle_toml is not None:
         yield source.vehicle_toml.name, source.vehicle_toml
     yield from ((path.name, path) for name in (REFERENCE_FILE, MANIFEST_FILE) if (path := beside(run, name)).is_file())

@@ -1,9 +1,14 @@
-"""Names of runs in the order in which people count."""
+"""The names of a run's files, each spelled here only, and names of runs in the order in which people count."""
 
 from __future__ import annotations
 
 import re
 from pathlib import PurePath
+
+ENCODER_FILE, AHRS_FILE, NMEA_FILE, GNSS_FILE = "encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv"
+VEHICLE_FILE = "vehicle.toml"
+BAG_FILE = "metadata.yaml"
+"""Tells that a folder is a ROS 2 bag."""
 
 NaturalKey = list[list[tuple[int, int, str]]]
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from sccal.errors import Failure, SccalError, UsageError, as_known
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.run import RunSource
 
 Made = TypeVar("Made")
@@ -73,7 +74,7 @@ def vehicle_place(source: RunSource, out: Path, own: Path) -> tuple[Path, bool]:
     prefix = 0
     if source.path != root:
         prefix = len(name.parts) - len(source.path.relative_to(root).parts)
-    shared = out.joinpath(*name.parts[:prefix], *above, "vehicle.toml")
-    if (own / "vehicle.toml").is_file() or (shared.is_file() and shared.read_bytes() != vehicle.read_bytes()):
-        return own / "vehicle.toml", True
+    shared = out.joinpath(*name.parts[:prefix], *above, VEHICLE_FILE)
+    if (own / VEHICLE_FILE).is_file() or (shared.is_file() and shared.read_bytes() != vehicle.read_bytes()):
+        return own / VEHICLE_FILE, True
     return shared, False

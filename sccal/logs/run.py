@@ -5,25 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from sccal.errors import DataError, Failure, UsageError
-from sccal.logs.ahrs import read_ahrs
-from sccal.logs.encoder import read_encoder
-from sccal.logs.gnss_csv import read_gnss_csv
-from sccal.logs.messages.bags import bag_folder_files
+from sccal.logs.folder import RunFolder, listed_folder, require_rows
+from sccal.logs.formats import MCAP, MESSAGE_SUFFIXES, ROS2, RUN_FILES, are_of_a_bag, message_format
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
-from sccal.logs.messages.read import MESSAGE_SUFFIXES, read_message_log
-from sccal.logs.names import natural_key
-from sccal.logs.nmea import read_nmea, read_nmea_heading
+from sccal.logs.messages.read import read_message_log
+from sccal.logs.names import ENCODER_FILE, VEHICLE_FILE, natural_key
 from sccal.logs.options import ReadOptions
 from sccal.logs.reference import read_reference
-from sccal.logs.streams import HeadingStream, Notice, Run
+from sccal.logs.streams import Run
 from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
-
-RUN_FILES = ("encoder.csv", "ahrs.csv", "gnss.nmea", "gnss.csv")
-"""Any of these makes a folder a run."""
-_FEWEST_ROWS = 2
 
 
 @dataclass(frozen=True)
@@ -39,6 +33,19 @@ class RunSource:
     searched_up_to: Path | None = None
     """The path given on the command line, where the search for vehicle.toml ended; None for the folder itself."""
 
+    @cached_property
+    def folder(self) -> RunFolder | None:
+        """The folder that the run is, listed when first asked for; None for a log of messages.
+
+        Raises DataError where the run is neither.
+        """
+        if message_format(self.path) is not None:
+            return None
+        if not self.path.is_dir():
+            raise DataError(f"{self.path}: is not a regular file, and is not opened; copy the log itself here")
+        folder = listed_folder(self.path)
+        return None if folder.is_bag else folder
+
 
 def discover(paths: Sequence[Path]) -> list[RunSource]:
     """All runs below the given paths, each once, in natural order within each path.
@@ -49,23 +56,10 @@ def discover(paths: Sequence[Path]) -> list[RunSource]:
     """
     if not paths:
         raise UsageError("no path given; name a run's folder or a folder of runs")
-    found: list[RunSource] = []
-    seen: set[str] = set()
-    for path in paths:
-        root = _root(path)
-        places = [path] if is_message_file(path) else _run_places(root)
-        sources = [
-            RunSource(_name_below(root, place), place, _nearest_vehicle(_folder_of(place), root), root)
-            for place in sorted(places, key=lambda place: natural_key(place.relative_to(root)))
-        ]
-        if not sources:
-            raise DataError(
-                f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}, "
-                f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own"
-            )
-        found += [source for source in sources if os.path.realpath(source.path) not in seen]
-        seen |= {os.path.realpath(source.path) for source in sources}
-    return _with_unique_names(found)
+    found, failures = find_runs(paths)
+    if failures:
+        raise failures[0].error
+    return found
 
 
 def find_runs(paths: Sequence[Path]) -> tuple[list[RunSource], list[Failure]]:
@@ -73,16 +67,34 @@ def find_runs(paths: Sequence[Path]) -> tuple[list[RunSource], list[Failure]]:
 
     Raises UsageError where a path does not exist.
     """
-    fruitful: list[Path] = []
+    found: list[RunSource] = []
     failures: list[Failure] = []
+    seen: set[str] = set()
     for path in paths:
         try:
-            discover([path])
+            sources = _below(path)
         except DataError as error:
             failures.append(Failure(str(path), error))
-        else:
-            fruitful.append(path)
-    return (discover(fruitful) if fruitful else []), failures
+            continue
+        found += [source for source in sources if os.path.realpath(source.path) not in seen]
+        seen |= {os.path.realpath(source.path) for source in sources}
+    return _with_unique_names(found), failures
+
+
+def _below(path: Path) -> list[RunSource]:
+    """The runs below one path. Raises DataError where there is none."""
+    root = _root(path)
+    places = [path] if message_format(path) is not None else _run_places(root)
+    sources = [
+        RunSource(_name_below(root, place), place, _nearest_vehicle(_folder_of(place), root), root)
+        for place in sorted(places, key=lambda place: natural_key(place.relative_to(root)))
+    ]
+    if not sources:
+        raise DataError(
+            f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}, "
+            f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own"
+        )
+    return sources
 
 
 def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
@@ -93,35 +105,14 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     Raises:
         DataError: a file is missing or cannot be used.
     """
-    if is_message_log(source.path):
+    folder = source.folder
+    if folder is None:
         return _read_message_run(source, options or ReadOptions())
-    if not source.path.is_dir():
-        raise DataError(f"{source.path}: is not a regular file, and is not opened; copy the log itself here")
-    there = [name for name in RUN_FILES if (source.path / name).is_file()]
-    missing = [name for name in ("encoder.csv", "ahrs.csv") if name not in there]
-    if missing == ["ahrs.csv"] and "gnss.nmea" in there:
-        missing = []
-    if not {"gnss.nmea", "gnss.csv"} & set(there):
-        missing.append("gnss.nmea (or gnss.csv)")
-    if missing:
-        odd = [name for name in RUN_FILES if name not in there and os.path.lexists(source.path / name)]
-        raise DataError(
-            f"{source.path}: lacks {', '.join(missing)}; found {', '.join(there) or 'none of the run files'}"
-            + (f"; not a regular file: {', '.join(odd)}" if odd else "")
-        )
+    folder.require_all()
     vehicle, notices = read_vehicle(vehicle_of(source))
-    wheels, wheel_notices = read_encoder(source.path / "encoder.csv", vehicle)
-    _require_rows(source.path / "encoder.csv", wheels.t_s.size, wheel_notices)
-    heading, heading_notices = _read_heading(source.path, there)
-    _require_rows(source.path / heading.source, heading.t_s.size, heading_notices)
-    if "gnss.nmea" in there:
-        fixes, fix_notices = read_nmea(source.path / "gnss.nmea")
-        if "gnss.csv" in there:
-            fix_notices = (Notice("gnss.csv", "file not read because gnss.nmea is there too", 1), *fix_notices)
-    else:
-        fixes, fix_notices = read_gnss_csv(source.path / "gnss.csv")
-    gnss = "gnss.nmea" if "gnss.nmea" in there else "gnss.csv"
-    _require_rows(source.path / gnss, fixes.lat_deg.size, fix_notices)
+    wheels, wheel_notices = folder.wheels(vehicle)
+    heading, heading_notices = folder.heading()
+    fixes, fix_notices = folder.fixes()
     return Run(
         name=source.name,
         path=source.path,
@@ -134,23 +125,11 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     )
 
 
-def _read_heading(folder: Path, there: Sequence[str]) -> tuple[HeadingStream, tuple[Notice, ...]]:
-    """From ahrs.csv; where there is none, from the receiver's own headings."""
-    if "ahrs.csv" in there:
-        return read_ahrs(folder / "ahrs.csv")
-    try:
-        return read_nmea_heading(folder / "gnss.nmea")
-    except DataError as error:
-        raise DataError(
-            f"{folder}: lacks ahrs.csv; found {', '.join(there)}, and no heading stands in for it: {error}"
-        ) from error
-
-
 def _read_message_run(source: RunSource, options: ReadOptions) -> Run:
     vehicle, notices = read_vehicle(vehicle_of(source))
     wheels, heading, fixes, found = read_message_log(source.path, vehicle, options)
     for what, count in (("wheels", wheels.t_s), ("heading", heading.t_s), ("fixes", fixes.lat_deg)):
-        _require_rows(f"{source.path} ({what})", count.size, found)
+        require_rows(f"{source.path} ({what})", count.size, found)
     reference = read_reference(source.path, fixes)
     return Run(source.name, source.path, vehicle, wheels, heading, fixes, (*notices, *found), reference)
 
@@ -159,16 +138,10 @@ def vehicle_of(source: RunSource) -> Path:
     """The vehicle.toml that applies to a run. Raises DataError where there is none."""
     if source.vehicle_toml is None:
         raise DataError(
-            f"{source.path}: no vehicle.toml here or above, up to {source.searched_up_to or source.path}; "
+            f"{source.path}: no {VEHICLE_FILE} here or above, up to {source.searched_up_to or source.path}; "
             f"add one with {MINIMAL_VEHICLE}"
         )
     return source.vehicle_toml
-
-
-def _require_rows(path: Path | str, usable: int, notices: Sequence[Notice]) -> None:
-    if usable < _FEWEST_ROWS:
-        why = "; ".join(f"{notice.count} {notice.what}" for notice in notices) or "the file holds no more"
-        raise DataError(f"{path}: {usable} usable rows, at least {_FEWEST_ROWS} are needed: {why}")
 
 
 def _root(path: Path) -> Path:
@@ -176,30 +149,11 @@ def _root(path: Path) -> Path:
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir():
         return path
-    if path.name in (*RUN_FILES, "vehicle.toml") or is_message_file(path):
+    if path.name in (*RUN_FILES, VEHICLE_FILE) or message_format(path) is not None:
         return path.parent
     raise DataError(
         f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
         f"or a file {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)}"
-    )
-
-
-def is_message_log(path: Path) -> bool:
-    """Whether a run's path is a log of messages (a file, or a bag's folder), not a folder of CSV and NMEA files."""
-    return is_message_file(path) or is_bag_folder(path)
-
-
-def is_message_file(path: Path) -> bool:
-    """Whether a path is a file that is a run on its own."""
-    return path.suffix.lower() in MESSAGE_SUFFIXES and path.is_file()
-
-
-def is_bag_folder(path: Path) -> bool:
-    """Whether a path is a rosbag2 folder."""
-    return (
-        path.is_dir()
-        and not any((path / name).is_file() for name in RUN_FILES)
-        and bag_folder_files([file.name for file in path.iterdir()])
     )
 
 
@@ -217,27 +171,27 @@ def _run_places(root: Path) -> Iterator[Path]:
             continue
         visited.add(real)
         below[:] = sorted(name for name in below if not name.startswith("."))
-        if "calibration.json" in files and "encoder.csv" not in files:
+        if "calibration.json" in files and ENCODER_FILE not in files:
             continue
-        if any(name in files for name in RUN_FILES) or bag_folder_files(files):
+        bag = are_of_a_bag(files)
+        if bag or any(name in files for name in RUN_FILES):
             yield Path(folder)
-        bag = bag_folder_files(files)
         for name in files:
             suffix = Path(name).suffix.lower()
-            if suffix in MESSAGE_SUFFIXES and not name.startswith(".") and not (bag and suffix == ".db3"):
+            if suffix in MESSAGE_SUFFIXES and not name.startswith(".") and not (bag and suffix == ROS2.suffix):
                 path = Path(folder) / name
-                if suffix != ".mcap" or not path.is_file() or library_of(path) != RESULT_LIBRARY:
+                if message_format(path) is not MCAP or library_of(path) != RESULT_LIBRARY:
                     yield path
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
     """Up to the path given; where that is a run itself, its campaign's folder just above counts too."""
-    if folder == root and not (folder / "vehicle.toml").is_file():
-        above = root.resolve().parent / "vehicle.toml"
+    if folder == root and not (folder / VEHICLE_FILE).is_file():
+        above = root.resolve().parent / VEHICLE_FILE
         return above if above.is_file() else None
     while True:
-        if (folder / "vehicle.toml").is_file():
-            return folder / "vehicle.toml"
+        if (folder / VEHICLE_FILE).is_file():
+            return folder / VEHICLE_FILE
         if folder == root or folder == folder.parent:
             return None
         folder = folder.parent

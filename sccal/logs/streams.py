@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import one_line
+from sccal.logs.names import AHRS_FILE
 
 Convention = Literal["enu", "ned"]
 _NO_ARRAYS = ("utc_has_date", "extras")
@@ -83,7 +84,7 @@ class HeadingStream:
     """The receiver's epochs, where it gives heading and fixes: both are put on the logging clock alike."""
     convention: Convention | None = None
     """Of yaw_rad; None for the vehicle's (see Vehicle.convention)."""
-    source: str = "ahrs.csv"
+    source: str = AHRS_FILE
     """Where the readings come from, as the user would name it."""
 
 

@@ -19,7 +19,7 @@ import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
-from sccal.logs.first_look import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
+from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
 from sccal.logs.streams import Notice
 from sccal.logs.timeline import order_in_time
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from sccal.errors import DataError
 from sccal.logs.limits import TICKS_PER_REV, TRACK_M, WHEEL_RADIUS_M
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Convention, Notice, Vehicle
 
 MINIMAL_VEHICLE = (
@@ -67,7 +68,7 @@ def _load(path: Path) -> dict[str, Any]:
     try:
         size = path.stat().st_size
         if size > _LARGEST_BYTES:
-            raise DataError(f"{path}: {size} bytes are no vehicle.toml; it should hold {MINIMAL_VEHICLE}")
+            raise DataError(f"{path}: {size} bytes are no {VEHICLE_FILE}; it should hold {MINIMAL_VEHICLE}")
         text = path.read_bytes().decode("utf-8-sig")
         return tomllib.loads(text.replace("\r\n", "\n"))
     except OSError as error:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, NMEA_FILE, VEHICLE_FILE
 from sccal.logs.nmea.kinds import MODE_LETTERS
 from sccal.logs.streams import Vehicle
 from sccal.logs.write import gga, gst, rmc, write_table, write_text, write_vehicle, zda
@@ -34,7 +35,7 @@ _LINE_GAP_S = 0.001
 def write_vehicle_file(settings: SimulationSettings, folder: Path) -> Path:
     """``vehicle.toml`` with the nominal values; gives its path."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "vehicle.toml"
+    path = folder / VEHICLE_FILE
     vehicle = Vehicle(
         name=settings.vehicle.name,
         path=path,
@@ -53,16 +54,16 @@ def write_run(simulated: SimulatedRun, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     encoder, ahrs = simulated.encoder, simulated.ahrs
     write_table(
-        folder / "encoder.csv",
+        folder / ENCODER_FILE,
         {"t": encoder.host_t_s, "left_ticks": encoder.left_ticks, "right_ticks": encoder.right_ticks},
         {"t": "%.4f", "left_ticks": "%d", "right_ticks": "%d"},
     )
     write_table(
-        folder / "ahrs.csv",
+        folder / AHRS_FILE,
         {"t": ahrs.host_t_s, "yaw_deg": ahrs.yaw_deg, "pitch_deg": ahrs.pitch_deg, "roll_deg": ahrs.roll_deg},
         {"t": "%.4f", "yaw_deg": "%.2f", "pitch_deg": "%.2f", "roll_deg": "%.2f"},
     )
-    write_text(folder / "gnss.nmea", "\n".join(nmea_lines(simulated)) + "\n")
+    write_text(folder / NMEA_FILE, "\n".join(nmea_lines(simulated)) + "\n")
     write_text(folder / "truth.json", json.dumps(truth(simulated), indent=2) + "\n")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +12,28 @@ from sccal.errors import DataError
 from sccal.logs.messages.mcap_file import Channel, OpenChannel, Sink
 from sccal.logs.streams import Notice
 
-BAG_SUFFIXES = (".db3", ".bag")
 _BATCH_BYTES = 1 << 20
 
 
-def read_bag(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
-    """Hand every wanted message of a .bag or .db3 file, or of a rosbag2 folder, to its channel's sink.
+def read_ros1_bag(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
+    """Hand every wanted message of a ROS 1 bag to its channel's sink.
 
     Raises:
         DataError: the library is missing, or the file cannot be read.
     """
+    return _read(path, open_channel, True)
+
+
+def read_ros2_bag(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
+    """Hand every wanted message of a ROS 2 bag, a SQLite file or a folder with some, to its channel's sink.
+
+    Raises:
+        DataError: the library is missing, or the file cannot be read.
+    """
+    return _read(path, open_channel, False)
+
+
+def _read(path: Path, open_channel: OpenChannel, ros1: bool) -> tuple[Notice, ...]:
     try:
         from rosbags.rosbag1 import Reader as Ros1Reader
         from rosbags.rosbag2 import Reader as Ros2Reader
@@ -33,7 +45,6 @@ def read_bag(path: Path, open_channel: OpenChannel) -> tuple[Notice, ...]:
         odd = [file.name for file in path.iterdir() if not file.is_file() and not file.is_dir()]
         if odd:
             raise DataError(f"{path}: {', '.join(sorted(odd)[:5])}: not a regular file, and not opened")
-    ros1 = path.suffix.lower() == ".bag"
     reader: Callable[[Path], Any] = Ros1Reader if ros1 else Ros2Reader
     lost: list[Notice] = []
     try:
@@ -89,8 +100,3 @@ def _channel(connection: Any, ros1: bool) -> Channel:
     own = "ros1msg" if ros1 else "ros2msg"
     encoding = own if name == "MSG" and text else ""
     return Channel(connection.topic, connection.msgtype, "ros1" if ros1 else "cdr", encoding, text.encode())
-
-
-def bag_folder_files(files: Iterable[str]) -> bool:
-    """Whether these files make a folder one rosbag2 run in SQLite."""
-    return "metadata.yaml" in files and any(name.lower().endswith(".db3") for name in files)

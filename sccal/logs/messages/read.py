@@ -12,8 +12,8 @@ from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.logs.ahrs import heading_of_table
 from sccal.logs.encoder import repaired_wheels
+from sccal.logs.formats import ROS2, message_format
 from sccal.logs.gnss_csv import fixes_of_table
-from sccal.logs.messages.bags import BAG_SUFFIXES, read_bag
 from sccal.logs.messages.converted import ConversionNote, TableKind, note_of, table_of
 from sccal.logs.messages.fixes import (
     fixes_of_positions,
@@ -24,7 +24,6 @@ from sccal.logs.messages.fixes import (
     lines_of_sentences,
 )
 from sccal.logs.messages.heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
-from sccal.logs.messages.mcap_file import read_mcap
 from sccal.logs.messages.topics import FIELDS, Messages, Topics
 from sccal.logs.messages.wheels import (
     joint_names,
@@ -39,8 +38,6 @@ from sccal.logs.options import ReadOptions
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
 from sccal.logs.table import Table
 
-MESSAGE_SUFFIXES = (".mcap", *BAG_SUFFIXES)
-"""Files that are runs on their own."""
 _PATH_OPTIONS = ("left_ticks", "right_ticks", "left_rad", "right_rad", "yaw", "latitude", "longitude")
 _LISTED = 40
 
@@ -110,8 +107,7 @@ def read_message_log(
 def _opened(path: Path, vehicle: Vehicle, options: ReadOptions) -> tuple[_Log, tuple[Notice, ...]]:
     topics = Topics(_asked_paths(options))
     metadata: dict[str, dict[str, str]] = {}
-    in_mcap = path.suffix.lower() == ".mcap"
-    notices = read_mcap(path, topics.open, metadata) if in_mcap else read_bag(path, topics.open)
+    notices = (message_format(path) or ROS2).read(path, topics.open, metadata)
     if not topics.seen:
         why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
         raise DataError(f"{path}: no message can be read: {why}")

@@ -1,0 +1,76 @@
+"""The beginning of a CSV file: whether there is a header, and which columns it names. Light: no table is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from sccal.errors import DataError
+
+LINE_LIMIT_BYTES = 64 * 1024
+COLUMN_LIMIT = 1000
+_CHUNK_BYTES = 1 << 20
+_BLANKS = b"\0 \t\r\n"
+
+
+def split_header(data: bytes, path: Path) -> tuple[list[str], str, int, int]:
+    """Column names, separator, the header's line number from 1, and where the bytes below it begin.
+
+    Raises:
+        DataError: no header, or one that no log has.
+    """
+    start = line = 0
+    while start < len(data):
+        end = data.find(b"\n", start)
+        end = len(data) if end < 0 else end
+        line += 1
+        if end - start > LINE_LIMIT_BYTES:
+            raise DataError(
+                f"{path}: line {line} has more than {LINE_LIMIT_BYTES // 1024} kB without a line end; "
+                "this is not a CSV file"
+            )
+        text = data[start:end].decode("utf-8", errors="replace").strip()
+        if text and not text.startswith("#"):
+            break
+        start = end + 1
+    else:
+        raise DataError(
+            f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
+        )
+    separator = next((mark for mark in ",;\t" if mark in text), ",")
+    names = [name.strip().strip('"').strip() for name in text.split(separator)]
+    if len(names) > COLUMN_LIMIT:
+        raise DataError(f"{path}: line {line} names {len(names)} columns, more than {COLUMN_LIMIT}; this is not a log")
+    return names, separator, line, end + 1
+
+
+def blank_file(path: Path, size_bytes: int) -> DataError:
+    """The error of a file without content."""
+    what = "is empty (0 bytes)" if not size_bytes else f"holds nothing but blanks ({size_bytes} bytes)"
+    return DataError(f"{path}: {what}; log it again or remove the run")
+
+
+def is_blank(data: bytes) -> bool:
+    """Whether there is nothing but spaces, line ends and zero bytes."""
+    return not data.strip(_BLANKS)
+
+
+def require_csv(path: Path) -> None:
+    """Look at the file's first megabyte.
+
+    Raises:
+        DataError: it cannot be read, is empty, or has no header that a log may have.
+    """
+    try:
+        with path.open("rb") as file:
+            begin = file.read(_CHUNK_BYTES)
+            if is_blank(begin):
+                if all(is_blank(chunk) for chunk in iter(lambda: file.read(_CHUNK_BYTES), b"")):
+                    raise blank_file(path, path.stat().st_size)
+                return
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+    if begin.startswith((b"\xff\xfe", b"\xfe\xff")) or (b"\n" not in begin and b"\r" in begin):
+        return  # for the reader of tables to say, or to take
+    if len(begin) == _CHUNK_BYTES:
+        begin += b"\nt"  # where all of it is comments, the header comes later
+    split_header(begin, path)

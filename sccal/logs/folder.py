@@ -1,0 +1,96 @@
+"""A run's folder, listed once, and each of its streams read from the file that holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sccal.errors import DataError
+from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
+from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
+
+_FEWEST_ROWS = 2
+_ANY_FIXES = f"{NMEA_FILE} (or {GNSS_FILE})"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The run files in a folder. What reads a stream raises DataError where it is missing or cannot be used."""
+
+    path: Path
+    there: tuple[str, ...]
+    """Regular files, in the order of RUN_FILES."""
+    odd: tuple[str, ...] = ()
+    """Run files that are no regular files, and are not opened."""
+    is_bag: bool = False
+    """Whether the folder is one ROS 2 bag, and none of the run files is there."""
+
+    @property
+    def fix_file(self) -> str:
+        """The file that the fixes are read from; empty where there is none."""
+        return self._first(FIXES)
+
+    def require_all(self) -> None:
+        """Raise DataError with what the folder lacks for a calibration."""
+        missing = [name for name in (ENCODER_FILE, AHRS_FILE) if name not in self.there]
+        if missing == [AHRS_FILE] and self._first(HEADINGS):
+            missing = []
+        if not self.fix_file:
+            missing.append(_ANY_FIXES)
+        if missing:
+            found = ", ".join(self.there) or "none of the run files"
+            odd = f"; not a regular file: {', '.join(self.odd)}" if self.odd else ""
+            raise DataError(f"{self.path}: lacks {', '.join(missing)}; found {found}{odd}")
+
+    def wheels(self, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notice, ...]]:
+        """The wheels, repaired by what the vehicle declares."""
+        name = self._first(WHEELS) or self._lacking(ENCODER_FILE)
+        wheels, notices = WHEELS[name](self.path / name, vehicle)
+        require_rows(self.path / name, wheels.t_s.size, notices)
+        return wheels, notices
+
+    def heading(self) -> tuple[HeadingStream, tuple[Notice, ...]]:
+        """The heading: of the AHRS, and where there is none the receiver's own."""
+        name = self._first(HEADINGS) or self._lacking(AHRS_FILE)
+        try:
+            heading, notices = HEADINGS[name](self.path / name)
+        except DataError as error:
+            if name == AHRS_FILE:
+                raise
+            found = f"{self.path}: lacks {AHRS_FILE}; found {', '.join(self.there)}"
+            raise DataError(f"{found}, and no heading stands in for it: {error}") from error
+        require_rows(self.path / heading.source, heading.t_s.size, notices)
+        return heading, notices
+
+    def fixes(self) -> tuple[FixStream, tuple[Notice, ...]]:
+        """The fixes; a second file with fixes is told, and not read."""
+        name = self.fix_file or self._lacking(_ANY_FIXES)
+        fixes, notices = FIXES[name](self.path / name)
+        others = [other for other in self.there if other in FIXES and other != name]
+        notices = (*(Notice(other, f"file not read because {name} is there too", 1) for other in others), *notices)
+        require_rows(self.path / name, fixes.lat_deg.size, notices)
+        return fixes, notices
+
+    def _first(self, readers: Iterable[str]) -> str:
+        return next((name for name in readers if name in self.there), "")
+
+    def _lacking(self, name: str) -> str:
+        raise DataError(f"{self.path}: lacks {name}")
+
+
+def listed_folder(path: Path) -> RunFolder:
+    """List a run's folder."""
+    names = {entry.name for entry in path.iterdir()}
+    regular = {name: (path / name).is_file() for name in RUN_FILES if name in names}
+    there = tuple(name for name in regular if regular[name])
+    odd = tuple(name for name in regular if not regular[name])
+    return RunFolder(path, there, odd, not there and are_of_a_bag(names))
+
+
+def require_rows(path: Path | str, usable: int, notices: Sequence[Notice]) -> None:
+    """Raise DataError where a file has too few rows to be a stream, with why."""
+    if usable < _FEWEST_ROWS:
+        why = "; ".join(f"{notice.count} {notice.what}" for notice in notices) or "the file holds no more"
+        raise DataError(f"{path}: {usable} usable rows, at least {_FEWEST_ROWS} are needed: {why}")
