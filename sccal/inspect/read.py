@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,19 +13,18 @@ from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.inspect.place import legs, placed_fixes
 from sccal.inspect.result import Unread
-from sccal.logs.ahrs import read_ahrs
-from sccal.logs.encoder import read_encoder
-from sccal.logs.gnss_csv import read_gnss_csv
-from sccal.logs.nmea import read_nmea, read_nmea_heading
+from sccal.logs.encoder import encoder_table
+from sccal.logs.folder import RunFolder
+from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.options import ReadOptions
-from sccal.logs.run import RunSource, read_run
+from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, Vehicle, WheelStream
-from sccal.logs.table import read_table
-from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
+from sccal.logs.vehicle import read_vehicle
 
-FEWEST_ROWS = 2
 FEWEST_LEGS = 5
 STAND_IN_TRACK_M = 1.0
+
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,12 @@ class LogStreams:
 
 
 def read_streams(source: RunSource, options: ReadOptions | None = None) -> LogStreams:
-    """Read whatever can be read of a run. Raises nothing for bad data: it is told in ``unread``."""
-    return _of_messages(source, options) if source.folder is None else _Folder(source).read()
+    """Read whatever can be read of a run: bad data are told in ``unread``.
+
+    Raises DataError where the run is neither a folder nor a file.
+    """
+    folder = source.folder
+    return _of_messages(source, options) if folder is None else _FolderReading(source, folder).streams()
 
 
 def _of_messages(source: RunSource, options: ReadOptions | None) -> LogStreams:
@@ -72,20 +77,21 @@ def _of_messages(source: RunSource, options: ReadOptions | None) -> LogStreams:
     return LogStreams(source, run.vehicle, True, True, run.wheels, run.heading, run.fixes, name, (), run.notices)
 
 
-class _Folder:
-    """Reads a folder file by file and collects what goes wrong."""
+@dataclass
+class _FolderReading:
+    """A folder read stream by stream, and what went wrong."""
 
-    def __init__(self, source: RunSource) -> None:
-        self.source, self.folder = source, source.path
-        self.unread: list[Unread] = []
-        self.notices: list[Notice] = []
+    source: RunSource
+    folder: RunFolder
+    unread: list[Unread] = field(default_factory=list)
+    notices: list[Notice] = field(default_factory=list)
 
-    def read(self) -> LogStreams:
-        fixes, fix_source = self._fixes()
-        heading = self._heading()
-        vehicle = self._vehicle()
+    def streams(self) -> LogStreams:
+        fixes = self._tried("fixes", self.folder.fixes)
+        heading = self._tried("heading", self.folder.heading)
+        vehicle = self._tried("vehicle", lambda: read_vehicle(vehicle_of(self.source)))
         wheels, used, track_known = self._wheels(vehicle, fixes, heading)
-        order = {"vehicle": 0, "wheels": 1, "heading": 2, "fixes": 3}
+        order = ("vehicle", "wheels", "heading", "fixes")
         return LogStreams(
             source=self.source,
             vehicle=used,
@@ -94,133 +100,70 @@ class _Folder:
             wheels=wheels,
             heading=heading,
             fixes=fixes,
-            fix_source=fix_source,
-            unread=tuple(sorted(self.unread, key=lambda one: order[one.what])),
+            fix_source=self.folder.fix_file,
+            unread=tuple(sorted(self.unread, key=lambda one: order.index(one.what))),
             notices=tuple(self.notices),
         )
 
-    def _lost(self, what: str, why: object) -> None:
-        self.unread.append(Unread(what, str(why)))
-
-    def _there(self, name: str) -> bool:
-        return (self.folder / name).is_file()
-
-    def _vehicle(self) -> Vehicle | None:
-        toml = self.source.vehicle_toml
-        if toml is None:
-            self._lost(
-                "vehicle",
-                f"{self.folder}: no vehicle.toml here or above, up to {self.source.searched_up_to or self.folder}; "
-                f"add one with {MINIMAL_VEHICLE}",
-            )
-            return None
+    def _tried(self, what: str, read: Callable[[], tuple[Read, tuple[Notice, ...]]]) -> Read | None:
         try:
-            vehicle, notices = read_vehicle(toml)
+            found, notices = read()
         except DataError as error:
-            self._lost("vehicle", error)
+            self.unread.append(Unread(what, str(error)))
             return None
         self.notices += notices
-        return vehicle
-
-    def _heading(self) -> HeadingStream | None:
-        own = self._there("ahrs.csv")
-        if not own and not self._there("gnss.nmea"):
-            self._lost("heading", f"{self.folder}: lacks ahrs.csv")
-            return None
-        try:
-            reader, name = (read_ahrs, "ahrs.csv") if own else (read_nmea_heading, "gnss.nmea")
-            heading, notices = reader(self.folder / name)
-            _require_rows(heading.source, heading.t_s.size)
-        except DataError as error:
-            self._lost("heading", error if own else f"{self.folder}: lacks ahrs.csv, and {error}")
-            return None
-        self.notices += notices
-        return heading
-
-    def _fixes(self) -> tuple[FixStream | None, str]:
-        name = next((name for name in ("gnss.nmea", "gnss.csv") if self._there(name)), "")
-        if not name:
-            self._lost("fixes", f"{self.folder}: lacks gnss.nmea (or gnss.csv)")
-            return None, ""
-        try:
-            fixes, notices = (read_nmea if name == "gnss.nmea" else read_gnss_csv)(self.folder / name)
-            _require_rows(name, fixes.lat_deg.size)
-        except DataError as error:
-            self._lost("fixes", error)
-            return None, name
-        self.notices += notices
-        if name == "gnss.nmea" and self._there("gnss.csv"):
-            self.notices.append(Notice("gnss.csv", "file not read because gnss.nmea is there too", 1))
-        return fixes, name
+        return found
 
     def _wheels(
         self, vehicle: Vehicle | None, fixes: FixStream | None, heading: HeadingStream | None
     ) -> tuple[WheelStream | None, Vehicle | None, bool]:
         """The wheels, the vehicle that they were read with, and whether its track means anything."""
-        if not self._there("encoder.csv"):
-            self._lost("wheels", f"{self.folder}: lacks encoder.csv")
-            return None, vehicle, vehicle is not None
-        path = self.folder / "encoder.csv"
         if vehicle is not None:
-            try:
-                wheels, notices = read_encoder(path, vehicle)
-                _require_rows("encoder.csv", wheels.t_s.size)
-            except DataError as error:
-                self._lost("wheels", error)
-                if vehicle.ticks_per_rev is not None:
-                    return None, vehicle, True
-            else:
-                self.notices += notices
+            wheels = self._tried("wheels", lambda: self.folder.wheels(vehicle))
+            if wheels is not None or vehicle.ticks_per_rev is not None:
                 return wheels, vehicle, True
         try:
-            made, track_known = self._stand_in(vehicle, fixes, heading)
-            wheels, notices = read_encoder(path, made)
-            _require_rows("encoder.csv", wheels.t_s.size)
+            made, track_known = _stand_in(self.folder, vehicle, fixes, heading)
+            wheels, notices = self.folder.wheels(made)
         except DataError as error:
             if vehicle is None:
-                self._lost("wheels", error)
+                self.unread.append(Unread("wheels", str(error)))
             return None, vehicle, vehicle is not None
         self.notices += notices
         return wheels, made, track_known
 
-    def _stand_in(
-        self, vehicle: Vehicle | None, fixes: FixStream | None, heading: HeadingStream | None
-    ) -> tuple[Vehicle, bool]:
-        """A vehicle whose wheels travel as far as the fixes, and turn as far as the heading.
 
-        Raises DataError where there are no fixes to scale by.
-        """
-        table = read_table(
-            self.folder / "encoder.csv", (("t", "left_ticks", "right_ticks"), ("t", "left_rad", "right_rad"))
+def _stand_in(
+    folder: RunFolder, vehicle: Vehicle | None, fixes: FixStream | None, heading: HeadingStream | None
+) -> tuple[Vehicle, bool]:
+    """A vehicle whose wheels travel as far as the fixes, and turn as far as the heading.
+
+    Raises DataError where there are no wheels, or no fixes to scale them by.
+    """
+    table = encoder_table(folder.wheel_path)
+    in_ticks = "left_ticks" in table.columns and "right_ticks" in table.columns
+    unit = "ticks" if in_ticks else "rad"
+    t_s, left, right = (table.columns[name] for name in ("t", f"left_{unit}", f"right_{unit}"))
+    m_per_count = None if fixes is None else _metres_per_count(t_s, left, right, fixes)
+    if m_per_count is None:
+        raise DataError(
+            f"{table.source}: {table.rows_seen} rows, {t_s[0]:.3f} … {t_s[-1]:.3f} s, cannot be scaled: neither "
+            f"{VEHICLE_FILE} nor the fixes say how far a count goes"
         )
-        in_ticks = "left_ticks" in table.columns and "right_ticks" in table.columns
-        unit = "ticks" if in_ticks else "rad"
-        t_s, left, right = (table.columns[name] for name in ("t", f"left_{unit}", f"right_{unit}"))
-        m_per_count = None if fixes is None else _metres_per_count(t_s, left, right, fixes)
-        if m_per_count is None:
-            raise DataError(
-                f"{table.source}: {table.rows_seen} rows, {t_s[0]:.3f} … {t_s[-1]:.3f} s, cannot be scaled: neither "
-                "vehicle.toml nor the fixes say how far a count goes"
-            )
-        track_m = None if heading is None else _track_m(t_s, left, right, heading, m_per_count)
-        radius_m = m_per_count / (2 * np.pi) if in_ticks else m_per_count
-        made = Vehicle(
-            name=self.folder.resolve().name if vehicle is None else vehicle.name,
-            path=self.folder / "vehicle.toml" if vehicle is None else vehicle.path,
-            wheel_radius_m=radius_m,
-            track_m=track_m or STAND_IN_TRACK_M,
-            ticks_per_rev=1.0 if in_ticks else None,
-        )
-        if vehicle is not None:
-            # The radius is declared and only the counts per turn are not.
-            counts = 2 * np.pi * vehicle.wheel_radius_m / m_per_count
-            return replace(vehicle, ticks_per_rev=counts if in_ticks else None), True
-        return made, track_m is not None
-
-
-def _require_rows(source: str, usable: int) -> None:
-    if usable < FEWEST_ROWS:
-        raise DataError(f"{source}: {usable} usable rows, at least {FEWEST_ROWS} are needed")
+    track_m = None if heading is None else _track_m(t_s, left, right, heading, m_per_count)
+    radius_m = m_per_count / (2 * np.pi) if in_ticks else m_per_count
+    made = Vehicle(
+        name=folder.path.resolve().name if vehicle is None else vehicle.name,
+        path=folder.path / VEHICLE_FILE if vehicle is None else vehicle.path,
+        wheel_radius_m=radius_m,
+        track_m=track_m or STAND_IN_TRACK_M,
+        ticks_per_rev=1.0 if in_ticks else None,
+    )
+    if vehicle is not None:
+        # The radius is declared and only the counts per turn are not.
+        counts = 2 * np.pi * vehicle.wheel_radius_m / m_per_count
+        return replace(vehicle, ticks_per_rev=counts if in_ticks else None), True
+    return made, track_m is not None
 
 
 def _metres_per_count(t_s: Floats, left: Floats, right: Floats, fixes: FixStream) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 from sccal.errors import DataError
 from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag
@@ -32,6 +33,11 @@ class RunFolder:
         """The file that the fixes are read from; empty where there is none."""
         return self._first(FIXES)
 
+    @property
+    def wheel_path(self) -> Path:
+        """The file that the wheels are read from."""
+        return self.path / (self._first(WHEELS) or self._lacking(ENCODER_FILE))
+
     def require_all(self) -> None:
         """Raise DataError with what the folder lacks for a calibration."""
         missing = [name for name in (ENCODER_FILE, AHRS_FILE) if name not in self.there]
@@ -46,9 +52,9 @@ class RunFolder:
 
     def wheels(self, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notice, ...]]:
         """The wheels, repaired by what the vehicle declares."""
-        name = self._first(WHEELS) or self._lacking(ENCODER_FILE)
-        wheels, notices = WHEELS[name](self.path / name, vehicle)
-        require_rows(self.path / name, wheels.t_s.size, notices)
+        path = self.wheel_path
+        wheels, notices = WHEELS[path.name](path, vehicle)
+        require_rows(path, wheels.t_s.size, notices)
         return wheels, notices
 
     def heading(self) -> tuple[HeadingStream, tuple[Notice, ...]]:
@@ -76,7 +82,7 @@ class RunFolder:
     def _first(self, readers: Iterable[str]) -> str:
         return next((name for name in readers if name in self.there), "")
 
-    def _lacking(self, name: str) -> str:
+    def _lacking(self, name: str) -> NoReturn:
         raise DataError(f"{self.path}: lacks {name}")
 
 
