@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from sccal.degrade.faults import Faults
 from sccal.degrade.folder import DegradedRun, Task, convention_of, fix_counts, manifest_of, with_earlier
 from sccal.degrade.mcap_faults import Changes, LogOfMessages, changes_of
 from sccal.degrade.mcap_patch import Patcher
-from sccal.degrade.mcap_records import Change, channels_of, rewritten_mcap
+from sccal.degrade.mcap_records import Change, rewritten_mcap
 from sccal.degrade.reference import reference_text
 from sccal.errors import DataError, UsageError
 from sccal.logs.messages.converted import note_of
@@ -20,6 +20,7 @@ from sccal.logs.messages.mcap_file import Channel, read_mcap
 from sccal.logs.messages.topics import Topics
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
 from sccal.logs.run import RunSource
+from sccal.logs.streams import Convention
 from sccal.logs.write import write_bytes
 
 
@@ -45,14 +46,12 @@ def degrade_mcap(source: RunSource, target: Path, faults: Faults) -> DegradedRun
         notices.append("no fault given: the file is as it was")
     else:
         convention = convention_of(source, faults)
-        log = _read(source, convention)
+        log, channels = _read(source, convention)
         span_s = log.span_s
         try:
             changes = changes_of(log, faults)
-            new = rewritten_mcap(raw, _change(raw, changes))
-        except MalformedError as error:
-            raise DataError(f"{source.path}: {error}") from error
-        except DataError as error:
+            new = rewritten_mcap(raw, _change(channels, changes))
+        except (MalformedError, DataError) as error:
             raise DataError(f"{source.path}: {error}") from error
     rows = changes.rows
     if rows is not None:
@@ -82,7 +81,7 @@ def degrade_mcap(source: RunSource, target: Path, faults: Faults) -> DegradedRun
     return run
 
 
-def _read(source: RunSource, convention: object) -> LogOfMessages:
+def _read(source: RunSource, convention: Convention) -> tuple[LogOfMessages, list[Channel]]:
     topics = Topics({})
     metadata: dict[str, dict[str, str]] = {}
     broken = read_mcap(source.path, topics.open, metadata)
@@ -93,26 +92,24 @@ def _read(source: RunSource, convention: object) -> LogOfMessages:
     doubled = [topic for topic, sinks in topics.sinks.items() if len(sinks) > 1]
     found, _ = topics.messages(source.path.name, "header", note.log_ahead_ns if note else 0)
     found = {topic: messages for topic, messages in found.items() if topic not in doubled}
-    return LogOfMessages(found, note, "ned" if convention == "ned" else "enu", source.name)
+    channels = [sink.channel for topic in found for sink in topics.sinks[topic]]
+    return LogOfMessages(found, note, convention, source.name), channels
 
 
-def _change(raw: bytes, changes: Changes) -> Change:
-    """What becomes of each message of the file."""
-    channels = channels_of(raw)
-    patchers = {number: Patcher(channel) for number, channel in channels.items()}
-    concerned = {topic for topic, _ in (*changes.numbers, *changes.texts, *changes.dropped)}
-    wanted: dict[int, Channel] = {n: c for n, c in channels.items() if c.topic in concerned}
+def _change(channels: Sequence[Channel], changes: Changes) -> Change:
+    """What becomes of each message of the file, of which only those of some channels may change."""
+    patchers = {channel.number: Patcher(channel) for channel in channels}
 
     def change(channel: int, place: int, data: bytes) -> bytes | None:
-        one = wanted.get(channel)
-        if one is None:
+        patcher = patchers.get(channel)
+        if patcher is None:
             return data
-        key = one.topic, place + 1
+        key = patcher.channel.topic, place + 1
         if key in changes.dropped:
             return None
         numbers, text = changes.numbers.get(key), changes.texts.get(key)
         if numbers is None and text is None:
             return data
-        return patchers[channel].patched(data, numbers or {}, text)
+        return patcher.patched(data, numbers or {}, text)
 
     return change

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 
 from sccal.errors import DataError
 from sccal.logs.messages.mcap_chunks import DamagedError, decompressed
-from sccal.logs.messages.mcap_file import Channel
 from sccal.logs.messages.mcap_magic import MAGIC
 
-_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
+_FOOTER, _MESSAGE, _CHUNK, _MESSAGE_INDEX, _CHUNK_INDEX = 2, 5, 6, 7, 8
 _ATTACHMENT_INDEX, _STATISTICS, _METADATA_INDEX = 10, 11, 13
 _SUMMARY_OFFSET, _DATA_END = 14, 15
 _HEAD = struct.Struct("<BQ")
@@ -186,36 +185,6 @@ def rewritten_mcap(raw: bytes, change: Change) -> bytes:
         return _Rewriter(raw, change).run()
     except (struct.error, IndexError, KeyError, ValueError) as error:
         raise DataError(f"the file is damaged ({error}); `mcap recover` makes a whole one") from error
-
-
-def channels_of(raw: bytes) -> dict[int, Channel]:
-    """The channels of a whole file by number, wherever they are declared."""
-    schemas: dict[int, tuple[str, str, bytes]] = {}
-    channels: dict[int, Channel] = {}
-
-    def declare(content: bytes) -> None:
-        for opcode, begin, end in _records(content, len(MAGIC) if content is raw else 0):
-            if opcode == _SCHEMA:
-                (number,) = struct.unpack_from("<H", content, begin)
-                name, at = _text(content, begin + 2)
-                encoding, at = _text(content, at)
-                schemas.setdefault(number, (name, encoding, content[at + 4 : end]))
-            elif opcode == _CHANNEL:
-                number, schema = struct.unpack_from("<HH", content, begin)
-                topic, at = _text(content, begin + 4)
-                encoding, _ = _text(content, at)
-                name, schema_encoding, text = schemas.get(schema, ("", "", b""))
-                channels.setdefault(number, Channel(topic, name, encoding, schema_encoding, text))
-            elif opcode == _CHUNK and content is raw:
-                (claimed,) = struct.unpack_from("<Q", raw, begin + 16)
-                compression, at = _text(raw, begin + 28)
-                (stored,) = struct.unpack_from("<Q", raw, at)
-                declare(decompressed(memoryview(raw)[at + 8 : at + 8 + stored], compression, claimed, False))
-            elif opcode == _DATA_END:
-                return
-
-    declare(raw)
-    return channels
 
 
 def _records(content: bytes, position: int = 0) -> Iterator[tuple[int, int, int]]:

@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from sccal.convert.paths import convert_paths
 from sccal.degrade.faults import Faults
 from sccal.degrade.paths import degrade_paths
 from sccal.errors import DataError, SccalError, UsageError
+from sccal.logs.messages.definitions import full_text
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
@@ -115,8 +117,6 @@ def rich(run: Run, compression: CompressionType) -> bytes:
     writer = Writer(file, chunk_size=20_000, compression=compression, enable_data_crcs=True)
     writer.start(profile="ros2", library="test")
     writer.add_metadata("made", {"by": "a test"})
-    from sccal.logs.messages.definitions import full_text
-
     channels: dict[str, int] = {}
     camera = writer.register_channel("/camera", "jpeg", 0, {"lens": "wide"})
     for number, (topic, kind, ns, raw) in enumerate(messages_of(run, None)):
@@ -129,6 +129,35 @@ def rich(run: Run, compression: CompressionType) -> bytes:
     writer.add_attachment(7, 8, "notes.txt", "text/plain", b"wet grass")
     writer.finish()
     return file.getvalue()
+
+
+def test_a_second_channel_under_the_name_of_a_stream_is_left_alone(run: Run, tmp_path: Path) -> None:
+    """Pictures on the fixes' topic are nobody's fixes, and are numbered on their own."""
+    file = io.BytesIO()
+    writer = Writer(file)
+    writer.start(profile="ros2", library="test")
+    picture = writer.register_channel("/fix", "cdr", writer.register_schema("sensor_msgs/msg/Image", "ros2msg", b""))
+    channels = {
+        topic: writer.register_channel(
+            topic, "cdr", writer.register_schema(kind, "ros2msg", full_text(kind.replace("/msg/", "/")).encode())
+        )
+        for topic, kind in {topic: kind for topic, kind, *_ in messages_of(run, None)}.items()
+    }
+    for topic, _, ns, raw in messages_of(run, None):
+        writer.add_message(channels[topic], ns, raw, ns)
+        if topic == "/fix":
+            writer.add_message(picture, ns, b"picture %d" % ns, ns)
+    writer.finish()
+    path = log(run, tmp_path / "logs", file.getvalue())
+    degrade(path, tmp_path / "out", replace(FAULTS, drop=True))
+    pictures = [message.data for message in of_type(path, "Image")]
+    assert len(pictures) > len(of_type(tmp_path / "out" / "run.mcap", "NavSatFix"))
+    assert [message.data for message in of_type(tmp_path / "out" / "run.mcap", "Image")] == pictures
+
+
+def of_type(path: Path, name: str) -> list[Any]:
+    with path.open("rb") as file:
+        return [message for schema, _, message in make_reader(file).iter_messages() if schema and name in schema.name]
 
 
 @pytest.mark.parametrize("kind", list(CompressionType))

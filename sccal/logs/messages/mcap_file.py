@@ -47,6 +47,8 @@ class Channel:
     schema_encoding: str
     """ros2msg, ros2idl, ros1msg, protobuf, jsonschema or empty."""
     schema: bytes
+    number: int = 0
+    """By which an MCAP file's messages name it."""
 
 
 class Sink(Protocol):
@@ -213,7 +215,7 @@ class _Walk:
             self._lose("schema or channel records that cannot be read", 1, place)
             return
         name, schema_encoding, schema = self.schemas.get(schema_number, ("", "", b""))
-        self.sinks[number] = self.open_channel(Channel(topic, name, encoding, schema_encoding, schema))
+        self.sinks[number] = self.open_channel(Channel(topic, name, encoding, schema_encoding, schema, number))
 
     def _keep_metadata(self, record: memoryview) -> None:
         try:
