@@ -7,12 +7,10 @@ place that corresponds. Where another vehicle's stands there, the run gets a fol
 from __future__ import annotations
 
 import json
-import os
-import shutil
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from sccal import __version__
 from sccal.convert.from_folder import tables_of_folder
@@ -25,7 +23,7 @@ from sccal.logs.formats import MCAP, RUN_FILES, message_format
 from sccal.logs.messages.converted import SCHEMA
 from sccal.logs.messages.mcap_file import library_of
 from sccal.logs.options import ReadOptions
-from sccal.logs.outputs import each_run, require_apart, vehicle_place
+from sccal.logs.outputs import Note, each_run, require_apart, vehicle_place
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
 from sccal.logs.run import RunSource, find_runs, vehicle_of
 from sccal.logs.streams import Notice
@@ -103,13 +101,8 @@ def _into_mcap(tables: RunTables, source: RunSource, out: Path, target: Path) ->
 
 
 def _into_folder(tables: RunTables, source: RunSource, out: Path, target: Path) -> None:
-    earlier = _earlier_files(target)
-    vehicle, _ = vehicle_place(source, out, target)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    staging = target.parent / f".{target.name}.{os.getpid()}.part"
-    shutil.rmtree(staging, ignore_errors=True)
-    staging.mkdir()
-    try:
+    with _NOTE.staged(target) as staging:
+        vehicle, _ = vehicle_place(source, out, target)
         write_folder_of(tables, staging)
         _copy_reference(source.path, staging)
         note = {
@@ -121,9 +114,6 @@ def _into_folder(tables: RunTables, source: RunSource, out: Path, target: Path) 
             "notices": [asdict(notice) for notice in tables.notices],
         }
         write_bytes(staging / NOTE_FILE, (json.dumps(note, indent=2, ensure_ascii=False) + "\n").encode())
-        _move_into_place(staging, target, earlier)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
     _write_missing(vehicle, tables.vehicle_text)
 
 
@@ -143,34 +133,10 @@ def _copy_reference(run: Path, target: Path) -> None:
             here.unlink(missing_ok=True)
 
 
-def _earlier_files(target: Path) -> list[str]:
-    """What an earlier call left in the folder. Raises UsageError where something else stands there."""
-    if not target.exists():
-        return []
-    if not target.is_dir():
-        raise UsageError(f"{target}: a file of that name is in the way")
-    note = target / NOTE_FILE
-    if not note.is_file():
-        if any(one.is_file() for one in target.iterdir()):
-            raise UsageError(f"{target}: holds files that sccal convert did not write; name another folder")
-        return []
-    try:
-        document = json.loads(note.read_text(encoding="utf-8"))
-        ours = document["schema"] == SCHEMA
-        names = [str(name) for name in document["files"]]
-    except (ValueError, KeyError, TypeError):
-        ours, names = False, []
-    if not ours:
-        raise UsageError(f"{note}: not a note of sccal convert; name another folder")
-    known = (*RUN_FILES, REFERENCE_FILE, MANIFEST_FILE)
-    return [NOTE_FILE, *(name for name in names if name in known)]
+def _files_noted(document: Any) -> list[str]:
+    if document["schema"] != SCHEMA:
+        raise ValueError(document["schema"])
+    return [name for name in document["files"] if name in (*RUN_FILES, REFERENCE_FILE, MANIFEST_FILE)]
 
 
-def _move_into_place(staging: Path, target: Path, earlier: list[str]) -> None:
-    if not target.exists():
-        staging.rename(target)
-        return
-    for name in earlier:
-        (target / name).unlink(missing_ok=True)
-    for path in sorted(staging.iterdir(), key=lambda path: path.name == NOTE_FILE):
-        path.replace(target / path.name)
+_NOTE = Note(NOTE_FILE, "note", "convert", _files_noted)

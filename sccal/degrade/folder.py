@@ -10,10 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,10 @@ from sccal.degrade.nmea import degrade_nmea
 from sccal.degrade.reference import after_both, reference_text
 from sccal.degrade.sheet import Sheet
 from sccal.degrade.tables import degrade_ahrs_csv, degrade_encoder_csv, degrade_gnss_csv
-from sccal.errors import DataError, UsageError
+from sccal.errors import DataError
 from sccal.logs.formats import FIXES
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE, VEHICLE_FILE
+from sccal.logs.outputs import Note
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, ReferenceRows, beside, read_reference_rows
 from sccal.logs.run import RunSource
 from sccal.logs.streams import Convention
@@ -129,23 +130,17 @@ def degrade_folder(source: RunSource, target: Path, faults: Faults, others: Coll
         UsageError: the folder is not ours to write into, or a window lies outside the run.
         DataError: a file that is to be rewritten is missing or cannot be read.
     """
-    earlier = _earlier_files(target)
+    _NOTE.earlier_files(target)
     _require_files(source.path, faults)
     notices: list[str] = []
     if faults.none:
         notices.append("no fault given: the files are as they were")
     task = Task(faults, source.name, _span_s(source.path, faults, notices), convention_of(source, faults))
-    target.parent.mkdir(parents=True, exist_ok=True)
-    staging = target.parent / f".{target.name}.{os.getpid()}.part"
-    shutil.rmtree(staging, ignore_errors=True)
-    staging.mkdir()
     try:
-        run = _written(source, staging, task, others, notices)
-        _move_into_place(staging, target, earlier)
+        with _NOTE.staged(target) as staging:
+            run = _written(source, staging, task, others, notices)
     except OSError as error:
         raise DataError(f"{error.filename or target}: cannot be read or written ({error.strerror or error})") from error
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
     return DegradedRun(source.name, target, run.fixes, run.rows_dropped, run.notices)
 
 
@@ -316,36 +311,10 @@ def _copied(path: Path, new_path: Path) -> str:
     return digest.hexdigest()
 
 
-def _earlier_files(target: Path) -> list[Path]:
-    """What an earlier call left in the folder. Raises UsageError where something else stands there."""
-    if not target.exists():
-        return []
-    if not target.is_dir():
-        raise UsageError(f"{target}: a file of that name is in the way")
-    manifest = target / MANIFEST_FILE
-    if not manifest.is_file():
-        if any(one.is_file() for one in target.iterdir()):
-            raise UsageError(f"{target}: holds files that sccal degrade did not write; name another folder")
-        return []
-    try:
-        document = json.loads(manifest.read_text(encoding="utf-8"))
-        ours = str(document["schema"]).startswith("sccal.degrade/")
-        names = [Path(one["name"]) for one in document["files"]]
-    except (ValueError, KeyError, TypeError):
-        ours, names = False, []
-    if not ours:
-        raise UsageError(f"{manifest}: not a manifest of sccal degrade; name another folder")
-    safe = [name for name in names if not name.is_absolute() and ".." not in name.parts]
-    return [Path(MANIFEST_FILE), Path(REFERENCE_FILE), *safe]
+def _files_listed(document: Any) -> list[str]:
+    if not str(document["schema"]).startswith("sccal.degrade/"):
+        raise ValueError(document["schema"])
+    return [REFERENCE_FILE, *(one["name"] for one in document["files"])]
 
 
-def _move_into_place(staging: Path, target: Path, earlier: list[Path]) -> None:
-    if not target.exists():
-        staging.rename(target)
-        return
-    for name in earlier:
-        (target / name).unlink(missing_ok=True)
-    found = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
-    for relative in sorted(found, key=lambda path: path == Path(MANIFEST_FILE)):
-        (target / relative).parent.mkdir(parents=True, exist_ok=True)
-        (staging / relative).replace(target / relative)
+_NOTE = Note(MANIFEST_FILE, "manifest", "degrade", _files_listed)

@@ -6,7 +6,6 @@ what is written can be calibrated on its own. One that stands above the path giv
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -16,8 +15,9 @@ from sccal.degrade.mcap import degrade_mcap
 from sccal.errors import DataError, Failure, SccalError
 from sccal.logs.formats import MCAP, message_format
 from sccal.logs.names import VEHICLE_FILE
-from sccal.logs.outputs import each_run, require_apart, vehicle_place
+from sccal.logs.outputs import each_run, require_apart, shared_vehicle_place, vehicle_place
 from sccal.logs.run import RunSource, find_runs
+from sccal.logs.write import write_bytes
 
 
 def degrade_paths(
@@ -56,7 +56,7 @@ def _degrade_file(source: RunSource, out: Path, faults: Faults) -> DegradedRun:
     target = out / source.name / Path(name).name if own else out / name
     run = degrade_mcap(source, target, faults)
     if place is not None and source.vehicle_toml is not None and not place.exists():
-        _write(place, source.vehicle_toml.read_bytes())
+        write_bytes(place, source.vehicle_toml.read_bytes())
     return run
 
 
@@ -66,20 +66,10 @@ def _copy_vehicle(source: RunSource, out: Path) -> None:
     if vehicle is None or vehicle.parent == source.path:
         return
     text = vehicle.read_bytes()
-    root = source.searched_up_to or source.path
-    name = Path(source.name)
-    above = vehicle.parent.relative_to(root).parts if vehicle.parent.is_relative_to(root) else ()
-    prefix = len(name.parts) - len(source.path.relative_to(root).parts) if source.path != root else 0
-    own, shared = out / name / VEHICLE_FILE, out.joinpath(*name.parts[:prefix], *above, VEHICLE_FILE)
+    own, shared = out / source.name / VEHICLE_FILE, shared_vehicle_place(source, out)
     if shared.exists() and shared.read_bytes() != text:
-        _write(own, text)
+        write_bytes(own, text)
         return
     own.unlink(missing_ok=True)
     if not shared.exists():
-        _write(shared, text)
-
-
-def _write(path: Path, text: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    temporary.write_bytes(text)
-    temporary.replace(path)
+        write_bytes(shared, text)
