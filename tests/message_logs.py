@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,11 +16,21 @@ from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 
 from sccal.logs.messages.definitions import full_text
-from sccal.logs.messages.write import Stamped, imu, joint_states, nav_sat_fixes, sentences
+from sccal.logs.messages.write import (
+    Stamped,
+    encoded,
+    imu,
+    joint_states,
+    nanoseconds_of,
+    nav_sat_fixes,
+    sentence_messages,
+    write_topics,
+)
 from sccal.logs.run import RunSource, read_run
 from sccal.logs.streams import Run
 
 VEHICLE = "[nominal]\nwheel_radius_m = 0.08\ntrack_m = 0.7\n[encoder]\nticks_per_rev = 1000\n"
+SENTENCE = re.compile(rb"^\s*([-+]?\d+(?:\.\d+)?)[\s,;]+(\$[^\r\n]*)", re.MULTILINE)
 Message = tuple[str, str, int, bytes]
 """Topic, type, log time (ns) and bytes."""
 
@@ -98,13 +109,31 @@ LZ4 = {"compression": CompressionType.LZ4}
 PLAIN = {"compression": CompressionType.NONE}
 
 
+def streams_of(run: Run, nmea: bytes | None) -> list[Stamped]:
+    """A run's streams; of ``nmea``, the bytes of a gnss.nmea, sentences instead of its fixes."""
+    fixes = nav_sat_fixes(run.fixes)
+    if nmea is not None:
+        found = SENTENCE.findall(nmea)
+        fixes = sentence_messages(nanoseconds_of(np.array([float(t) for t, _ in found])), [text for _, text in found])
+    return [joint_states(run.wheels), imu(run.heading, run.vehicle.convention), fixes]
+
+
+def write_mcap(run: Run, path: Path, nmea: bytes | None = None) -> None:
+    """A run as an MCAP file, its further columns as topics of numbers."""
+    further = [
+        encoded("/" + re.sub(r"\W+", "_", name), "std_msgs/msg/Float64", t_s[rows], {}, {}, {"data": column[rows]})
+        for t_s, extras in ((run.wheels.t_s, run.wheels.extras), (run.heading.t_s, run.heading.extras))
+        for name, column in extras.items()
+        for rows in (np.isfinite(column),)
+    ]
+    write_topics(path, [*streams_of(run, nmea), *further])
+
+
 def messages_of(run: Run, nmea: bytes | None) -> list[Message]:
     """A run's messages in order of time."""
-    fixes = nav_sat_fixes(run.fixes) if nmea is None else sentences(nmea, run.path)
-    topics: Sequence[Stamped] = (joint_states(run.wheels), imu(run.heading, run.vehicle.convention), fixes)
     rows = [
         (topic.topic, topic.type_name, ns, raw)
-        for topic in topics
+        for topic in streams_of(run, nmea)
         for ns, raw in zip(topic.stamp_ns.tolist(), topic.messages, strict=True)
     ]
     return sorted(rows, key=lambda row: row[2])

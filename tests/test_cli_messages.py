@@ -13,10 +13,9 @@ import sccal.batch
 from sccal.cli.calibrate import calibrate
 from sccal.cli.diagnose import diagnose
 from sccal.cli.reading import READ_OPTIONS
-from sccal.logs.messages.write import write_mcap
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import discover, read_run
-from tests.message_logs import messages_of, ros2_bytes
+from tests.message_logs import messages_of, ros2_bytes, write_mcap
 from tests.runs import written
 from tests.test_cli_inputs import sccal as command
 

@@ -17,11 +17,10 @@ from typing import Any
 import pytest
 
 from sccal.cli import main
-from sccal.logs.messages.write import write_mcap
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
 from tests.compare.test_diagnoses import diagnosis, finding
-from tests.message_logs import json_bytes, messages_of, stamp, write_ros1
+from tests.message_logs import json_bytes, messages_of, stamp, write_mcap, write_ros1
 from tests.runs import written
 
 ROOT = Path(__file__).resolve().parents[1]

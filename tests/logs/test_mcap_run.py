@@ -24,7 +24,7 @@ from sccal.errors import DataError, UsageError
 from sccal.logs.messages.definitions import full_text
 from sccal.logs.messages.heading import euler
 from sccal.logs.messages.topics import seconds_of
-from sccal.logs.messages.write import nanoseconds_of, write_mcap
+from sccal.logs.messages.write import nanoseconds_of
 from sccal.logs.options import ReadOptions
 from sccal.logs.quality import quality_of
 from sccal.logs.run import discover, read_run
@@ -45,6 +45,7 @@ from tests.message_logs import (
     ros2_bytes,
     stamp,
     write_db3,
+    write_mcap,
     write_ros1,
 )
 from tests.runs import written

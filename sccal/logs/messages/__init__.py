@@ -8,5 +8,5 @@
 ``wheels``, ``heading`` and ``fixes``  the streams out of such columns
 ``converted``    the tables of a log that was converted, as they were
 ``read``         which topics are the streams: a whole log read
-``write``        a run as an MCAP file
+``write``        streams as the messages of an MCAP file
 """

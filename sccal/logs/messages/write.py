@@ -1,7 +1,7 @@
-"""A run as an MCAP file in the ros2 profile: JointState, Imu, and NMEA sentences or NavSatFix, stamped as logged.
+"""Streams as MCAP messages in the ros2 profile: JointState, Imu, and NMEA sentences or NavSatFix, stamped as logged.
 
-All values are written as they were read, in double precision, so that the file calibrates as the run does. Messages of
-one topic have one layout: a blank message is encoded once, and numpy sets its numbers row by row.
+All values are written as they are, in double precision. Messages of one topic have one layout: a blank message is
+encoded once, and numpy sets its numbers row by row.
 """
 
 from __future__ import annotations
@@ -23,10 +23,9 @@ from sccal.logs.messages.converted import LEFT_JOINT, RIGHT_JOINT
 from sccal.logs.messages.definitions import full_text, known_definitions
 from sccal.logs.messages.ros import RosWalker
 from sccal.logs.quality import navsat_status
-from sccal.logs.streams import FixStream, HeadingStream, Run, WheelStream
+from sccal.logs.streams import FixStream, HeadingStream, WheelStream
 
 WHEELS_TOPIC, HEADING_TOPIC, FIX_TOPIC, NMEA_TOPIC = "/joint_states", "/imu/data", "/fix", "/nmea_sentence"
-_SENTENCE = re.compile(rb"^\s*([-+]?\d+(?:\.\d+)?)[\s,;]+(\$[^\r\n]*)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -46,18 +45,6 @@ class Stamped:
     def log_times_ns(self) -> Ints:
         """(n) log times."""
         return self.stamp_ns if self.log_ns is None else self.log_ns
-
-
-def write_mcap(run: Run, path: Path, nmea: bytes | None = None, compression: str = "zstd") -> None:
-    """Write a run; of ``nmea``, the bytes of its gnss.nmea, all sentences with a receive time, instead of its fixes.
-
-    Raises:
-        DataError: ``nmea`` holds no sentence with a receive time; times before 1970-01-01 (negative ones).
-    """
-    topics = [joint_states(run.wheels), imu(run.heading, run.vehicle.convention)]
-    topics.append(nav_sat_fixes(run.fixes) if nmea is None else sentences(nmea, path))
-    topics += _further(run)
-    write_topics(path, topics, compression=compression)
 
 
 def write_topics(
@@ -167,18 +154,6 @@ def nav_sat_numbers(fixes: FixStream) -> dict[str, Floats]:
     }
 
 
-def sentences(nmea: bytes, path: Path) -> Stamped:
-    """Every NMEA sentence with a receive time before it, stamped with that time.
-
-    Raises DataError where there is none: a message needs a time of its own.
-    """
-    found = [(float(stamp), text) for stamp, text in _SENTENCE.findall(nmea)]
-    if not found:
-        raise DataError(f"{path}: no NMEA sentence has a receive time before it; write the fixes instead")
-    stamp_ns = nanoseconds_of(np.array([t for t, _ in found]))
-    return sentence_messages(stamp_ns, [text for _, text in found])
-
-
 def sentence_messages(stamp_ns: Ints, texts: Sequence[bytes], log_ns: Ints | None = None) -> Stamped:
     """Sentences (n) as messages with these stamps (n); a stamp of 0 is none."""
     messages = []
@@ -187,15 +162,6 @@ def sentence_messages(stamp_ns: Ints, texts: Sequence[bytes], log_ns: Ints | Non
         head += bytes(-(len(head) - 4) % 4)
         messages.append(head + struct.pack("<I", len(text) + 1) + text + b"\0")
     return Stamped(NMEA_TOPIC, "nmea_msgs/msg/Sentence", stamp_ns, messages, log_ns)
-
-
-def _further(run: Run) -> Iterator[Stamped]:
-    """Further columns, each as a topic of numbers."""
-    for t_s, extras in ((run.wheels.t_s, run.wheels.extras), (run.heading.t_s, run.heading.extras)):
-        for name, column in extras.items():
-            rows = np.isfinite(column)
-            topic = "/" + re.sub(r"\W+", "_", name)
-            yield encoded(topic, "std_msgs/msg/Float64", t_s[rows], {}, {}, {"data": column[rows]})
 
 
 def encoded(
