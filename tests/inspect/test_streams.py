@@ -11,6 +11,7 @@ from sccal.align import Clock
 from sccal.errors import DataError
 from sccal.inspect.fixes import STRIP_CELLS, fix_facts
 from sccal.inspect.place import PlacedFixes, legs
+from sccal.logs.run import discover, read_run
 from sccal.logs.streams import FixStream
 from tests.inspect.logs import inspected, rows, said, stream
 
@@ -104,6 +105,21 @@ def test_wheels_that_nothing_scales(spoilt):
     assert "cannot be scaled" in said(found, "encoder.csv").text
     assert [one.name for one in found.streams] == ["heading"]
     assert found.drive is None
+
+
+@pytest.mark.parametrize("spoil", ["too short", "missing"])
+@pytest.mark.parametrize("name", FILES)
+def test_what_is_not_there_is_told_as_a_calibration_tells_it(spoilt, name, spoil):
+    path = spoilt / FILES[name]
+    if spoil == "missing":
+        path.unlink()
+    else:
+        path.write_text("\n".join(path.read_text().splitlines()[: 1 if name == "fixes" else 2]) + "\n")
+    with pytest.raises(DataError) as refused:
+        read_run(*discover([spoilt]))
+    [unread] = inspected(spoilt).unread
+    assert unread.what == name
+    assert unread.why == str(refused.value) or (spoil == "missing" and str(refused.value).startswith(unread.why))
 
 
 def test_nothing_at_all(spoilt):
