@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 import subprocess
 import sys
@@ -159,6 +160,20 @@ def test_imports_point_down_only(path):
         assert other == room or floor_of(other) < floor_of(room), f"line {line}: {room} imports {other}"
 
 
+def module_of(path: Path) -> str:
+    """The full name by which a module is imported."""
+    return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def test_no_module_needs_itself():
+    modules = {module_of(path): path for path in MODULES}
+    needs = {
+        module: {name if name in modules else name.rpartition(".")[0] for _, name in imported(parsed(path))} - {module}
+        for module, path in modules.items()
+    }
+    graphlib.TopologicalSorter(needs).prepare()  # raises CycleError with the circle
+
+
 @each_module
 def test_some_rooms_may_use_less(path):
     room = room_of(path)
@@ -265,7 +280,7 @@ def names_used_elsewhere() -> set[str]:
 @each_module
 def test_nothing_is_kept_that_nobody_uses(path, names_used_elsewhere):
     tree = parsed(path)
-    module = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+    module = module_of(path)
     loaded = [(node, names_loaded(node)) for node in tree.body]
     unused = [
         name
