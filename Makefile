@@ -8,7 +8,7 @@ FUZZ_SECONDS ?= 60
 .DEFAULT_GOAL := help
 STUDY_OUT ?= docs
 
-.PHONY: help run test lint bench fuzz study-noise study-effects study-parking study-field samples clean
+.PHONY: help run test test-slow lint bench fuzz study-noise study-effects study-parking study-field samples clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -17,7 +17,10 @@ run: $(VENV)/.ready ## set up if needed, then calibrate sample_logs/ into out/
 	@$(BIN)/sccal calibrate sample_logs --out $(OUT)
 
 test: $(VENV)/.ready-dev lint ## set up if needed, then lint, type-check and test
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto -m "not slow"
+
+test-slow: $(VENV)/.ready-dev ## the tests that make test leaves out for their length
+	$(BIN)/python -m pytest -n auto -m slow
 
 lint: $(VENV)/.ready-dev ## ruff (style and format) and mypy
 	$(BIN)/ruff check .

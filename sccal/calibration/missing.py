@@ -45,8 +45,13 @@ class Lacking:
     """(4,) what they are known to with it."""
 
     def widened(self, covariance: Floats) -> Floats:
-        """The covariance (4, 4) of the constants, owning up to what is missing."""
-        return at_least(covariance, np.diag(self.sigmas**2)) + np.outer(self.apart, self.apart)
+        """The covariance (4, 4) of the constants, owning up to what is missing; an offset that is held stays held."""
+        free = np.flatnonzero(np.diag(covariance) > 0.0)
+        rows = np.ix_(free, free)
+        widened = covariance.copy()
+        widened[rows] = at_least(covariance[rows], np.diag(self.sigmas[free] ** 2))
+        widened[rows] += np.outer(self.apart[free], self.apart[free])
+        return widened
 
 
 def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float) -> Lacking:

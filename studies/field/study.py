@@ -80,7 +80,7 @@ def _row(outcome: Outcome[str, Mark]) -> list[str]:
         _cut(mark.got, 140),
         numbers,
         ok,
-        _cut("; ".join(mark.faults), 400),
+        _cut("; ".join(mark.faults), 400).replace("](", "] ("),  # no link of Markdown
     ]
 
 

@@ -81,6 +81,12 @@ def test_the_covariance_is_widened_along_what_moves_together():
     assert found[0, 2] == pytest.approx(-2e-5)
 
 
+def test_an_offset_that_is_held_stays_held():
+    covariance = np.diag([1e-8, 1e-8, 1e-6, 0.0])
+    found = Lacking((), np.array([0.0, 0.0, 0.0, 0.1]), np.full(4, 1e-9)).widened(covariance)
+    assert np.array_equal(found, covariance)
+
+
 def test_a_calibration_tells_it(tmp_path):
     effect, values = parse_effect("lever_arm=0.4,0")
     write_log(tmp_path, [effect.physics(values)])

@@ -28,6 +28,7 @@ def diagnosed(name):
     return diagnose([align(read_run(source)) for source in discover([LOGS / name])], CalibrationOptions())
 
 
+@pytest.mark.slow
 def test_the_van_lacks_its_antenna_beside_the_middle():
     """The antenna's place is measured: 0.7375 m to the right of the middle."""
     found = diagnosed("psu-van")
@@ -60,6 +61,7 @@ def test_the_husky_lacks_the_iron_at_its_compass():
     assert found.after.gnss_innovation_rms_m <= found.before.gnss_innovation_rms_m / 3.0
 
 
+@pytest.mark.slow
 def test_each_run_of_the_van_covers_what_all_say_together(tmp_path):
     batch = calibrate_paths(
         [LOGS / "psu-van"], tmp_path, CalibrationOptions(effects=("lever_arm",)), lambda source, result: None

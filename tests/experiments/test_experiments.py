@@ -102,6 +102,7 @@ def test_the_wander_is_seeded_and_of_its_size():
     assert np.degrees(one.std()) == pytest.approx(WANDER_DEG, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_given_run_is_judged_by_its_own_fixes_and_a_bad_one_stops_nothing(tmp_path):
     written(tmp_path / "logs" / "good", "ahrs.drift_sigma_deg=2", duration_s=240.0)
     bad = tmp_path / "logs" / "bad"

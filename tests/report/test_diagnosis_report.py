@@ -266,7 +266,7 @@ def test_the_antenna_s_side_in_words(forward_m: float, left_m: float, says: str)
         ("radius_step", (-0.02, 312.0), "both wheels' radii shrink by 2.00 % 312 s after the run's start"),
         ("missed_right", (0.02, 9.0), "the right wheel's counter loses 2.00 % of its counts above 9.00 rad/s"),
         ("missed_left", (0.02, 0.0), "the left wheel's counter loses 2.00 % of its counts"),
-        ("speed_offset", (0.041,), "the wheels read 0.041 m/s too fast while the robot moves"),
+        ("speed_offset", (0.041, 0.02), "the wheels read 0.041 m/s too fast while the robot moves"),
         ("heading_scale", (-0.012,), "the AHRS reading turns 1.20 % less than the robot"),
         (
             "antenna_height",

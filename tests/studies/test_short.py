@@ -9,6 +9,7 @@ from studies.effects import EffectCase, work
 from studies.noise import run
 
 
+@pytest.mark.slow
 def test_the_noise_is_found_on_logs_of_another_simulator():
     """No likelihood below that of the true noise by more than a nat, and no verdict that names a cause."""
     _, data = run(2, 17, PoolOptions(jobs=1), False)
