@@ -64,6 +64,7 @@ def connected(address: str, workers: int) -> Cluster:
         time.sleep(0.2)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing(scheduler, tmp_path):
     address, workers = scheduler
     logs = some_runs(tmp_path / "logs", NAMES)

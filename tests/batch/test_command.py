@@ -74,6 +74,7 @@ def test_after_kill_9_resume_repeats_only_what_was_not_finished(logs, undisturbe
     assert contents(out) == contents(undisturbed)
 
 
+@pytest.mark.slow
 def test_resume_repeats_what_is_damaged_or_was_made_otherwise(logs, undisturbed, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(undisturbed, out)

@@ -57,7 +57,7 @@ def three(tmp_path_factory):
     return tmp, *both(tmp)
 
 
-@pytest.mark.parametrize("case", ["one", "three"])
+@pytest.mark.parametrize("case", ["one", pytest.param("three", marks=pytest.mark.slow)])
 def test_both_commands_judge_the_same_drift(case, request):
     _, diagnosis, vehicle = request.getfixturevalue(case)
     found = [finding["effect"] for finding in diagnosis["findings"]]

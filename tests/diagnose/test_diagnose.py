@@ -156,6 +156,7 @@ def test_nothing_is_found_where_nothing_is():
     require_constants(found)
 
 
+@pytest.mark.slow
 def test_a_users_column_and_an_effect_are_found_together():
     """Both missing, the likeliest noise is a wandering heading and slipping wheels, and nothing seems to lack."""
     found = diagnosis_of(with_motor_field("turn_slip=0.2"))

@@ -20,6 +20,7 @@ def test_the_noise_is_found_on_logs_of_another_simulator():
         assert not case["names_a_cause"], case["verdict"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", ["lever_arm", "radius_step"])
 def test_an_effect_that_another_simulator_makes_is_named_alone(tmp_path, label):
     found = work(EffectCase(1_700_001, (label,), "usual"), tmp_path)
