@@ -54,6 +54,7 @@ def test_provenance_names_inputs_options_and_versions_and_no_machine(logs, undis
     assert os.uname().nodename not in json.dumps(provenance)
 
 
+@pytest.mark.slow
 def test_after_kill_9_resume_repeats_only_what_was_not_finished(logs, undisturbed, tmp_path):
     out = tmp_path / "out"
     working = subprocess.Popen(

@@ -53,6 +53,7 @@ def the_readme_shows(printed):
             assert float(a) == pytest.approx(float(b), rel=0.05, abs=5 * 10.0 ** -len(a.partition(".")[2]))
 
 
+@pytest.mark.slow
 def test_the_husky_lacks_the_iron_at_its_compass():
     found = diagnosed("husky")
     iron = found.findings[0]
