@@ -17,7 +17,7 @@ run: $(VENV)/.ready ## set up if needed, then calibrate sample_logs/ into out/
 	@$(BIN)/sccal calibrate sample_logs --out $(OUT)
 
 test: $(VENV)/.ready-dev lint ## set up if needed, then lint, type-check and test
-	$(BIN)/python -m pytest -n auto -m "not slow"
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow"
 
 test-slow: $(VENV)/.ready-dev ## the tests that make test leaves out for their length
 	$(BIN)/python -m pytest -n auto -m slow

@@ -110,7 +110,11 @@ def test_pages_have_commands():
     assert "sccal calibrate path/to/logs" in commands_of(ROOT / "README.md")
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if commands_of(page)], ids=lambda page: page.stem)
+LONG = pytest.mark.slow
+RUN = [pytest.param(page, marks=LONG if page.stem == "first-hour" else ()) for page in PAGES if commands_of(page)]
+
+
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
 def test_every_command_of_a_page_works(page, materials, tmp_path, monkeypatch):
     shutil.copytree(materials, tmp_path, dirs_exist_ok=True)
     (tmp_path / "sample_logs").symlink_to(ROOT / "sample_logs")

@@ -88,6 +88,7 @@ def test_resume_repeats_what_is_damaged_or_was_made_otherwise(logs, undisturbed,
     assert "stood already" not in calibrate(logs, "--out", out, "--jobs", 1, "--resume", "--window", 20)
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_what_is_done_says_so_and_no_process(tmp_path):
     logs, out = some_runs(tmp_path / "logs", tuple("abcdefgh")), tmp_path / "out"
     working = subprocess.Popen(
