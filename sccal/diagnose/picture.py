@@ -29,7 +29,21 @@ NORMAL_MAD = 1.4826
 UNSURE = 5.0
 """Bins whose error is so many times the usual are not drawn: they would only stretch the axis."""
 
-Quantity = Callable[[DriveView, Moments], Floats]
+
+@dataclass(frozen=True)
+class Windows:
+    """The robot in stretches of its drive: means over each, and where it is in the middle."""
+
+    t_s: Floats
+    speed_mps: Floats
+    turn_rate_radps: Floats
+    acceleration_mps2: Floats
+    yaw_rad: Floats
+    east_m: Floats
+    north_m: Floats
+
+
+Quantity = Callable[[DriveView, Moments | Windows], Floats]
 
 
 @dataclass(frozen=True)
@@ -40,11 +54,11 @@ class Cause:
     of: Quantity
 
 
-def _heading_deg(_: DriveView, at: Moments) -> Floats:
+def _heading_deg(_: DriveView, at: Moments | Windows) -> Floats:
     return np.asarray(np.degrees(at.yaw_rad) % 360.0)
 
 
-def _time_s(view: DriveView, at: Moments) -> Floats:
+def _time_s(view: DriveView, at: Moments | Windows) -> Floats:
     return at.t_s - view.start_s
 
 
@@ -175,7 +189,7 @@ def _over_windows(before: Model, after: Model, run: int, cause: Cause, port: str
     def rate(each: Floats) -> Floats:
         return np.asarray(np.diff(np.interp(edges, view.steps.t_s, np.cumsum(each))) / MOTION_WINDOW_S)
 
-    at = Moments(
+    at = Windows(
         t_s=middles,
         speed_mps=rate(view.steps.along_m),
         turn_rate_radps=rate(view.steps.turn_rad),

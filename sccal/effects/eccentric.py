@@ -6,13 +6,14 @@ travel = R ∫ (1 + cos · cos φ + sin · sin φ) dφ      φ the wheel's cumul
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
+from sccal.effects.one_wheel import wheels_turned
 from sccal.effects.view import DriveView
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
@@ -82,9 +83,7 @@ class _OffCentre(Physics):
         return {f"eccentric_{self.wheel}": {"cos": self.cos, "sin": self.sin}}
 
     def wheel_angle(self, motion: Motion, angle_rad: WheelPair) -> WheelPair:
-        if self.wheel == "left":
-            return replace(angle_rad, left=self._turned(angle_rad.left))
-        return replace(angle_rad, right=self._turned(angle_rad.right))
+        return wheels_turned((self.wheel,), angle_rad, self._turned)
 
     def _turned(self, even_rad: Floats) -> Floats:
         """φ with φ + cos · sin φ + sin · (1 − cos φ) = the angle of an even wheel, by Newton's method."""

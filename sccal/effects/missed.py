@@ -10,13 +10,14 @@ wheel passes through that band in a moment. At above_radps = 0 the share is alwa
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
+from sccal.effects.one_wheel import wheels_turned
 from sccal.effects.view import DriveView
 from sccal.effects.words import Measured, percent, size
 from sccal.simulate.physics import Physics
@@ -145,9 +146,7 @@ class _Losing(Physics):
         return {f"missed_{self.wheel}": {"ratio": self.ratio, **limit}}
 
     def wheel_angle(self, motion: Motion, angle_rad: WheelPair) -> WheelPair:
-        if self.wheel == "left":
-            return replace(angle_rad, left=self._counted(angle_rad.left, motion.t_s))
-        return replace(angle_rad, right=self._counted(angle_rad.right, motion.t_s))
+        return wheels_turned((self.wheel,), angle_rad, lambda turned_rad: self._counted(turned_rad, motion.t_s))
 
     def _counted(self, turned_rad: Floats, t_s: Floats) -> Floats:
         """Cumulative angle that arrives at the counter's other end."""

@@ -8,6 +8,7 @@ from typing import Literal
 from sccal.arrays import Floats
 from sccal.effects.effect import Column
 from sccal.effects.view import Steps
+from sccal.effects.words import Measured, percent
 from sccal.simulate.world import WheelPair
 
 Wheels = tuple[Literal["right", "left"], ...]
@@ -29,3 +30,9 @@ def wheels_turned(wheels: Wheels, angle_rad: WheelPair, turned: Callable[[Floats
         left=turned(angle_rad.left) if "left" in wheels else angle_rad.left,
         right=turned(angle_rad.right) if "right" in wheels else angle_rad.right,
     )
+
+
+def changes(wheels: Wheels, whose: str, share: Measured) -> str:
+    """Whose radius grows or shrinks by a share: "both wheels' radii shrink by 2.00 %"."""
+    verb = "grow" if share.value > 0.0 else "shrink"
+    return f"{whose} {verb}{'s' if len(wheels) == 1 else ''} by {percent(share)}"

@@ -12,9 +12,9 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
-from sccal.effects.one_wheel import Wheels, wheel_columns, wheels_turned
+from sccal.effects.one_wheel import Wheels, changes, wheel_columns, wheels_turned
 from sccal.effects.view import DriveView
-from sccal.effects.words import Measured, percent
+from sccal.effects.words import Measured
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -34,9 +34,7 @@ class _RadiusDrift(Effect):
     whose: str
 
     def says(self, found: Mapping[str, Measured]) -> str:
-        plural = "" if len(self.wheels) > 1 else "s"
-        grow = "grow" if found["per_hour"].value > 0.0 else "shrink"
-        return f"{self.whose} {grow}{plural} by {percent(found['per_hour'])} an hour"
+        return f"{changes(self.wheels, self.whose, found['per_hour'])} an hour"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         steps = drive.steps

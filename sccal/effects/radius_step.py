@@ -12,9 +12,9 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
-from sccal.effects.one_wheel import Wheels, wheel_columns, wheels_turned
+from sccal.effects.one_wheel import Wheels, changes, wheel_columns, wheels_turned
 from sccal.effects.view import DriveView, Steps
-from sccal.effects.words import Measured, moment, percent
+from sccal.effects.words import Measured, moment
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import Motion, WheelPair
 
@@ -40,9 +40,7 @@ class _RadiusStep(Effect):
     whose: str
 
     def says(self, found: Mapping[str, Measured]) -> str:
-        plural = "" if len(self.wheels) > 1 else "s"
-        grow = "grow" if found["ratio"].value > 0.0 else "shrink"
-        return f"{self.whose} {grow}{plural} by {percent(found['ratio'])} {moment(found['at_s'])}"
+        return f"{changes(self.wheels, self.whose, found['ratio'])} {moment(found['at_s'])}"
 
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         return wheel_columns("ratio", self.wheels, drive.steps, after(drive.steps, drive.start_s + at["at_s"]))

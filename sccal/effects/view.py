@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,6 +12,35 @@ from sccal.align import Aligned, Series, Timeline
 from sccal.arrays import Floats
 
 SMOOTH_S = 0.3
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Speed, turn rate and acceleration over SMOOTH_S about any time; computed where somebody asks."""
+
+    t_s: Floats
+    along_m: Floats
+    """Cumulative, as the turn."""
+    turn_rad: Floats
+
+    @classmethod
+    def of_steps(cls, t_s: Floats, right_m: Floats, left_m: Floats, track_m: float) -> Rates:
+        """Of the wheels' travel in each step (n,)."""
+        right, left = np.cumsum(right_m), np.cumsum(left_m)
+        return cls(t_s, 0.5 * (right + left), (right - left) / track_m)
+
+    def speed(self, at_s: Floats) -> Floats:
+        """Along, m/s."""
+        return _rate(self.t_s, self.along_m, at_s)
+
+    def turn_rate(self, at_s: Floats) -> Floats:
+        """By the wheels, rad/s."""
+        return _rate(self.t_s, self.turn_rad, at_s)
+
+    def acceleration(self, at_s: Floats) -> Floats:
+        """Along, m/s²."""
+        half = 0.5 * SMOOTH_S
+        return (self.speed(at_s + half) - self.speed(at_s - half)) / (2.0 * half)
 
 
 @dataclass(frozen=True)
@@ -22,14 +52,8 @@ class Steps:
     right_m: Floats
     """Travel of the right wheel."""
     left_m: Floats
-    along_m: Floats
-    turn_rad: Floats
-    """By the wheels."""
     track_m: float
-    speed_mps: Floats
-    turn_rate_radps: Floats
-    acceleration_mps2: Floats
-    """Along; positive while a forward speed grows."""
+    rates: Rates
     right_angle_rad: Floats
     """Cumulative angle of the right wheel from the log's first sample, in the middle of the step."""
     left_angle_rad: Floats
@@ -41,19 +65,61 @@ class Steps:
     roll_rad: Floats
     """Left side up."""
 
+    @cached_property
+    def along_m(self) -> Floats:
+        """Travel of the middle between the wheels."""
+        return 0.5 * (self.right_m + self.left_m)
+
+    @cached_property
+    def turn_rad(self) -> Floats:
+        """Turn by the wheels."""
+        return (self.right_m - self.left_m) / self.track_m
+
+    @cached_property
+    def speed_mps(self) -> Floats:
+        """Along, in the middle of the step."""
+        return self.rates.speed(self._middle_s)
+
+    @cached_property
+    def turn_rate_radps(self) -> Floats:
+        """In the middle of the step."""
+        return self.rates.turn_rate(self._middle_s)
+
+    @cached_property
+    def acceleration_mps2(self) -> Floats:
+        """Along; positive while a forward speed grows."""
+        return self.rates.acceleration(self._middle_s)
+
+    @property
+    def _middle_s(self) -> Floats:
+        return self.t_s - 0.5 * self.dt_s
+
 
 @dataclass(frozen=True)
 class Moments:
     """The robot at some measurements."""
 
     t_s: Floats
-    speed_mps: Floats
-    turn_rate_radps: Floats
-    acceleration_mps2: Floats
+    rates: Rates
     yaw_rad: Floats
     """The robot's heading as far as known, not wrapped."""
     east_m: Floats
     north_m: Floats
+
+    @cached_property
+    def speed_mps(self) -> Floats:
+        """Along."""
+        return self.rates.speed(self.t_s)
+
+    @cached_property
+    def turn_rate_radps(self) -> Floats:
+        """By the wheels."""
+        return self.rates.turn_rate(self.t_s)
+
+    @cached_property
+    def acceleration_mps2(self) -> Floats:
+        """Along; positive while a forward speed grows."""
+        return self.rates.acceleration(self.t_s)
 
 
 @dataclass(frozen=True)
@@ -120,16 +186,14 @@ def view_drive(
     right_m, left_m = belief.radius_right_m * right_rad, belief.radius_left_m * left_rad
     if clear is None:
         right, left = belief.radius_right_m * aligned.right_rad, belief.radius_left_m * aligned.left_rad
-        rates = _Rates(aligned.wheel_t_s, 0.5 * (right + left), (right - left) / belief.track_m)
+        rates = Rates(aligned.wheel_t_s, 0.5 * (right + left), (right - left) / belief.track_m)
     else:
-        rates = _Rates.of_steps(timeline.t_s, right_m, left_m, belief.track_m)
+        rates = Rates.of_steps(timeline.t_s, right_m, left_m, belief.track_m)
 
     def moments(at_s: Floats) -> Moments:
         return Moments(
             t_s=at_s,
-            speed_mps=rates.speed(at_s),
-            turn_rate_radps=rates.turn_rate(at_s),
-            acceleration_mps2=rates.acceleration(at_s),
+            rates=rates,
             yaw_rad=np.interp(at_s, belief.t_s, belief.yaw_rad),
             east_m=np.interp(at_s, belief.t_s, belief.east_m),
             north_m=np.interp(at_s, belief.t_s, belief.north_m),
@@ -145,12 +209,8 @@ def view_drive(
         dt_s=dt,
         right_m=right_m,
         left_m=left_m,
-        along_m=0.5 * (right_m + left_m),
-        turn_rad=(right_m - left_m) / belief.track_m,
         track_m=belief.track_m,
-        speed_mps=rates.speed(middle),
-        turn_rate_radps=rates.turn_rate(middle),
-        acceleration_mps2=rates.acceleration(middle),
+        rates=rates,
         right_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.right_rad),
         left_angle_rad=np.interp(middle, aligned.wheel_t_s, aligned.left_rad),
         right_rate_radps=_rate(aligned.wheel_t_s, aligned.right_rad, middle),
@@ -170,54 +230,13 @@ def view_drive(
 
 def with_travel(drive: DriveView, right_m: Floats, left_m: Floats) -> DriveView:
     """The same drive with other travel of the wheels in each step (n,): speeds and turn rates follow."""
-    steps = drive.steps
-    rates = _Rates.of_steps(steps.t_s, right_m, left_m, steps.track_m)
-
-    def moments(of: Moments) -> Moments:
-        return replace(
-            of,
-            speed_mps=rates.speed(of.t_s),
-            turn_rate_radps=rates.turn_rate(of.t_s),
-            acceleration_mps2=rates.acceleration(of.t_s),
-        )
-
-    middle = steps.t_s - 0.5 * steps.dt_s
-    moved = replace(
-        steps,
-        right_m=right_m,
-        left_m=left_m,
-        along_m=0.5 * (right_m + left_m),
-        turn_rad=(right_m - left_m) / steps.track_m,
-        speed_mps=rates.speed(middle),
-        turn_rate_radps=rates.turn_rate(middle),
-        acceleration_mps2=rates.acceleration(middle),
+    rates = Rates.of_steps(drive.steps.t_s, right_m, left_m, drive.steps.track_m)
+    return replace(
+        drive,
+        steps=replace(drive.steps, right_m=right_m, left_m=left_m, rates=rates),
+        headings=replace(drive.headings, rates=rates),
+        fixes=replace(drive.fixes, rates=rates),
     )
-    return replace(drive, steps=moved, headings=moments(drive.headings), fixes=moments(drive.fixes))
-
-
-@dataclass(frozen=True)
-class _Rates:
-    """Speed, turn rate and acceleration over SMOOTH_S about any time."""
-
-    t_s: Floats
-    along_m: Floats
-    """Cumulative, as the turn."""
-    turn_rad: Floats
-
-    @classmethod
-    def of_steps(cls, t_s: Floats, right_m: Floats, left_m: Floats, track_m: float) -> _Rates:
-        right, left = np.cumsum(right_m), np.cumsum(left_m)
-        return cls(t_s, 0.5 * (right + left), (right - left) / track_m)
-
-    def speed(self, at_s: Floats) -> Floats:
-        return _rate(self.t_s, self.along_m, at_s)
-
-    def turn_rate(self, at_s: Floats) -> Floats:
-        return _rate(self.t_s, self.turn_rad, at_s)
-
-    def acceleration(self, at_s: Floats) -> Floats:
-        half = 0.5 * SMOOTH_S
-        return (self.speed(at_s + half) - self.speed(at_s - half)) / (2.0 * half)
 
 
 def _rate(t_s: Floats, cumulative: Floats, at_s: Floats) -> Floats:

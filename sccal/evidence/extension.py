@@ -161,56 +161,52 @@ class FreeEffects:
 
         Columns at the heading are derivatives at the values, beside what makes the whole exact there. With D(p, ψ) what
         an effect does to the reading, and c = ∂D/∂p: D(p₀, ψ₀) − c p₀ is known, and ∂D/∂ψ is how much more than by
-        itself the reading turns with the robot. Secants, which the effects give, are D over p. What follows the body is
-        laid out last, along what the others leave of the wheels' motion.
+        itself the reading turns with the robot. Secants, which the effects give, are D over p. Effects of a later
+        stage are laid out in the drive that those of the earlier ones leave.
         """
         delay_s = self._delay_s(view, values)
         seen = view if delay_s is None else replace(view, fix_delay_s=delay_s)
         found = Laid(seen, _turned_rad(seen))
         if known is not None and found.turned_rad is known.turned_rad is None:
             found = known
-        known_count = found.count
-        ends = np.cumsum([0, *(len(free.parameters) for free in self.effects)]).tolist()
-        spans = list(zip(self.effects, pairwise(ends), strict=True))
-        before: list[int] = []
-        for stage in STAGES:
-            here = [(free, first, last) for free, (first, last) in spans[known_count:] if free.effect.stage == stage]
-            if here and before:
-                passed = [one for one in found.placed if one.parameter in before]
-                found = replace(found, view=_after(seen, passed, values))
+        new = self._spans[found.count :]
+        stage_of = [STAGES.index(effect.stage) for effect, _ in self.parameters]
+        for number, stage in enumerate(STAGES):
+            here = [one for one in new if one[0].effect.stage == stage]
+            if here and number:
+                before = [one for one in found.placed if stage_of[one.parameter] < number]
+                found = replace(found, view=_after(seen, before, values))
             for free, first, last in here:
                 found = found.and_one(free, values[first:last], first)
-            before += [k for free, span in spans for k in range(*span) if free.effect.stage == stage]
         return replace(found, view=seen)
+
+    @cached_property
+    def _spans(self) -> tuple[tuple[Free, int, int], ...]:
+        """Each effect with where its parameters begin and end among all."""
+        ends = np.cumsum([0, *(len(free.parameters) for free in self.effects)]).tolist()
+        return tuple((free, first, last) for free, (first, last) in zip(self.effects, pairwise(ends), strict=True))
 
     def _delay_s(self, view: DriveView, values: Floats) -> Floats | None:
         """How old each fix is at some values (f,); None where none is."""
-        first, total = 0, np.zeros(view.fixes.t_s.size)
-        for free in self.effects:
-            last = first + len(free.parameters)
-            delay = free.delay_s(view, values[first:last].tolist())
-            total = total if delay is None else total + delay
-            first = last
+        delays = (free.delay_s(view, values[first:last].tolist()) for free, first, last in self._spans)
+        total = sum((one for one in delays if one is not None), np.zeros(view.fixes.t_s.size))
         return total if total.any() else None
 
 
 def _after(view: DriveView, placed: Sequence[Placed], values: Floats) -> DriveView:
     """The drive with what some columns, scaled by parameters (m,), add to the wheels' travel or take from it."""
     right_m, left_m = view.steps.right_m, view.steps.left_m
-    for one in placed:
-        value = values[one.parameter]
-        if one.column.port not in MOTION_PORTS or value == 0.0:
-            continue
-        more = value * one.column.values
-        if one.column.port == "turn":
-            more = 0.5 * view.steps.track_m * more
-        if one.column.port in ("right_wheel", "along", "turn"):
+    moves = [one for one in placed if one.column.port in MOTION_PORTS and values[one.parameter] != 0.0]
+    for one in moves:
+        more, port = values[one.parameter] * one.column.values, one.column.port
+        if port == "turn":
+            aside_m = 0.5 * view.steps.track_m * more
+            right_m, left_m = right_m + aside_m, left_m - aside_m
+        if port in ("right_wheel", "along"):
             right_m = right_m + more
-        if one.column.port in ("left_wheel", "along"):
+        if port in ("left_wheel", "along"):
             left_m = left_m + more
-        if one.column.port == "turn":
-            left_m = left_m - more
-    return view if right_m is view.steps.right_m and left_m is view.steps.left_m else with_travel(view, right_m, left_m)
+    return with_travel(view, right_m, left_m) if moves else view
 
 
 def _turned_rad(view: DriveView) -> Floats | None:

@@ -42,6 +42,7 @@ from studies.field.files import (
     write_vehicle,
 )
 from studies.field.further_robots import Bend, Drawn, case_of
+from studies.field.known_messages import Odometer, nav_pvt_of
 from studies.field.known_sentences import POS_REST, crc32, gpsd_reports, week
 from studies.field.wanted import ANY_LEVEL, Chapter, Truth, inspected, refused, right
 from studies.field.world import START_S, Instruments, Log
@@ -336,17 +337,8 @@ TYPES.add("message-strings-headings", case_of(4300, strings_with_headings), righ
 
 
 def nav_pvt(_number: int, ns: int, lat: float, lon: float) -> Told:
-    """A receiver's own message, ten-millionths of degrees."""
-    values = {
-        "i_tow": ns // 10**6 % 604_800_000,
-        "lon": round(lon * 1e7),
-        "lat": round(lat * 1e7),
-        "height": 450_000,
-        "h_acc": 14,
-        "fix_type": 3,
-        "flags": 131,
-    }
-    return [("/rover/navpvt", "ublox_msgs/msg/NavPVT", values)]
+    """A receiver's own message, under another topic."""
+    return nav_pvt_of("/rover/navpvt", ns, lat, lon)
 
 
 TYPES.add(
@@ -427,8 +419,6 @@ TYPES.add("message-twist-stamped", case_of(4303, twist_robot), right(4.0, ANY_LE
 
 def odometry_of_pose(drawn: Drawn, folder: Path) -> Truth:
     """Odometry whose twist is not filled in, its pose by the nominal robot."""
-    from studies.field.known_messages import Odometer
-
     log = drawn.log()
     odometer = Odometer(log.robot.nominal_radius_m, log.robot.nominal_track_m)
 

@@ -133,8 +133,8 @@ TYPES.add(
 )
 
 
-def nav_pvt(_number: int, ns: int, lat: float, lon: float) -> Told:
-    """A receiver's own message: ten-millionths of degrees."""
+def nav_pvt_of(topic: str, ns: int, lat: float, lon: float) -> Told:
+    """A receiver's own message, in ten-millionths of degrees, under a topic."""
     content = {
         "i_tow": ns // 10**6 % 604_800_000,
         "lon": round(lon * 1e7),
@@ -144,7 +144,12 @@ def nav_pvt(_number: int, ns: int, lat: float, lon: float) -> Told:
         "fix_type": 3,
         "flags": 131,
     }
-    return [("/ublox/navpvt", "ublox_msgs/msg/NavPVT", content)]
+    return [(topic, "ublox_msgs/msg/NavPVT", content)]
+
+
+def nav_pvt(_number: int, ns: int, lat: float, lon: float) -> Told:
+    """The same where its driver usually has it."""
+    return nav_pvt_of("/ublox/navpvt", ns, lat, lon)
 
 
 TYPES.add(
