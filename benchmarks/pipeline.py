@@ -85,9 +85,9 @@ def main() -> None:
         aligned = align(run)
         problem = RunProblem(aligned, build_timeline(aligned), find_start(aligned), NOISE, CalibrationOptions().filter)
         at = problem.at_centre()
-        clear = problem.clear_steps(at.constants)
+        laid = problem.laid_out(at)
         events = problem.timeline.t_s.size
-        passes = timed(lambda: problem.begun(at, False, clear).finish())
+        passes = timed(lambda: problem.begun(at, False, laid).finish())
         show("one pass of the filter", passes, f"{1e9 * passes[1] / events:.0f} ns an event, {events:,} events")
 
         command = [sys.executable, "-m", "sccal", "calibrate", str(folder), "--out", str(Path(name) / "out")]

@@ -179,8 +179,8 @@ def likelihood_margin(folder: Path, truth: dict[str, Any]) -> float:
     costs = []
     for noise in (found, true):
         logs = search.levels.logs(noise)
-        _, at = search.settled(fine, logs, rough)
-        cost, _ = search.settled(fine, logs, at)
+        _, here = search.settled(logs, search.about(fine, rough))
+        cost, _ = search.settled(logs, here)
         costs.append(cost - search.levels.price(logs))
     return costs[1] - costs[0]
 

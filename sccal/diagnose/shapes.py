@@ -103,7 +103,7 @@ class Scan:
         columns = None
         if isinstance(extension, FreeEffects):
             columns = extension.columns_in(self.view, at.values, problem.timeline, self.laid)
-        found = problem.passed(at, self.clear, columns, with_sigmas=False)
+        found = problem.passed(at, problem.laid_out(at, self.clear, columns), with_sigmas=False)
         return whole_nll(problem, at, found), found
 
     @property

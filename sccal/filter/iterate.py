@@ -50,6 +50,16 @@ class At:
         return 1.0 if self.path is None else self.path.prior_scale
 
 
+@dataclass(frozen=True)
+class LaidOut:
+    """What a pass needs that follows from where it linearises, whatever the noise."""
+
+    clear: tuple[Floats, Floats]
+    """The wheels' motion freed of slip."""
+    columns: Columns
+    start: Start
+
+
 class Extension(Protocol):
     """Parameters beyond the paper's, supplied by a room that knows effects; the filter knows columns only."""
 
@@ -133,52 +143,48 @@ class RunProblem:
         except DataError:  # the effects stand where no robot could be: what was found without them is nearer
             return self.start
 
+    def laid_out(self, at: At, clear: tuple[Floats, Floats] | None = None, columns: Columns | None = None) -> LaidOut:
+        """What a pass from there needs, for passes under several noises; what is known of it already may be given."""
+        clear = self.clear_steps(at.constants) if clear is None else clear
+        columns = self.columns(at, clear) if columns is None else columns
+        return LaidOut(clear, columns, self.start_given(columns, at.values))
+
     def begun(
         self,
         at: At,
         linearise_there: bool = False,
-        clear: tuple[Floats, Floats] | None = None,
-        columns: Columns | None = None,
-        start: Start | None = None,
+        laid: LaidOut | None = None,
         with_sigmas: bool = True,
         prior_scale: float | None = None,
     ) -> Filter:
         """A filter at the first event, its priors around the given values.
 
-        ``clear``, ``columns`` and ``start`` (from ``start_given``) spare their computation where they are known
-        already; without sigmas the outputs hold states alone, which spares much where there are many effects.
+        ``laid`` spares its computation where it is known already; without sigmas the outputs hold states alone, which
+        spares much where there are many effects.
         """
-        clear = self.clear_steps(at.constants) if clear is None else clear
-        columns = self.columns(at, clear) if columns is None else columns
+        laid = self.laid_out(at) if laid is None else laid
         run = Filter(
             self.aligned,
             self.timeline,
             self.noise,
             self.options,
             self.centre,
-            clear,
+            laid.clear,
             at.constants if linearise_there else None,
-            columns,
+            laid.columns,
             self.extra,
             with_sigmas,
         )
-        start = self.start_given(columns, at.values) if start is None else start
         scale = at.prior_scale if prior_scale is None else prior_scale
-        run.begin(start, at.constants, self.scaled_prior(scale), at.values)
+        run.begin(laid.start, at.constants, self.scaled_prior(scale), at.values)
         return run
 
     def passed(
-        self,
-        at: At,
-        clear: tuple[Floats, Floats] | None = None,
-        columns: Columns | None = None,
-        start: Start | None = None,
-        with_sigmas: bool = True,
-        prior_scale: float | None = None,
+        self, at: At, laid: LaidOut | None = None, with_sigmas: bool = True, prior_scale: float | None = None
     ) -> ForwardPass:
         """A whole pass that starts and linearises there; see ``begun`` for the rest."""
         scale = at.prior_scale if prior_scale is None else prior_scale
-        run = self.begun(at, True, clear, columns, start, with_sigmas, scale)
+        run = self.begun(at, True, laid, with_sigmas, scale)
         return self.with_whole_prior(at, run.finish(), scale)
 
     def with_whole_prior(self, at: At, found: ForwardPass, scale: float) -> ForwardPass:
@@ -229,10 +235,11 @@ def iterate(
     scale = 1.0
     for _ in range(max_rounds + MOST_HALVINGS):
         theta = np.concatenate((at.constants.as_array(), at.values))
-        found = problem.passed(at, with_sigmas=with_sigmas, prior_scale=scale)
+        laid = problem.laid_out(at)
+        found = problem.passed(at, laid, with_sigmas, scale)
         cost = whole_nll(problem, at, found)
         if best is None and problem.extra:
-            narrow = problem.passed(at, with_sigmas=with_sigmas, prior_scale=NARROW)
+            narrow = problem.passed(at, laid, with_sigmas, NARROW)
             if (other := whole_nll(problem, at, narrow)) < cost - WORSE_NATS:
                 found, cost, scale = narrow, other, NARROW
         if best is not None and not cost < best[0] + WORSE_NATS:

@@ -93,12 +93,13 @@ LOG_OUTLIER_FIX = math.log(OUTLIER_FRACTION / OUTLIER_AREA_M2)
 
 
 @compiled
-def _open_position(belief: Belief, nu_e: float, nu_n: float, level: float, use_offset: bool) -> None:
+def _open_position(belief: Belief, nu_e: float, nu_n: float, level: float, model: Model) -> None:
     """The way back from a lock-out: forget the position, and step by step what else may have been wrong.
 
     Level 1 forgets the position; level 2 the heading too, together with the opposite change of the offset, so that
-    the AHRS reading stays explained; from level 3 on the wheels are given 5 % more. What lies beyond OPENED_AT_MOST_M
-    is moved at once: a variance of thousands of kilometres squared leaves no digits for what a fix then teaches.
+    the AHRS reading stays explained; from level 3 on the wheels are given 5 % more, unless the pass estimates: to
+    forget a constant there would be to unlearn what the log has said of it. What lies beyond OPENED_AT_MOST_M is moved
+    at once: a variance of thousands of kilometres squared leaves no digits for what a fix then teaches.
     """
     x, P, V = belief.x, belief.core, belief.slope
     away = math.hypot(nu_e, nu_n)
@@ -120,11 +121,11 @@ def _open_position(belief: Belief, nu_e: float, nu_n: float, level: float, use_o
     if level >= 2:
         turn = (0.35 * (level - 1.0)) ** 2
         P[THETA, THETA] += turn
-        if use_offset:
+        if model.use_offset:
             P[THETA, OFFSET] -= turn
             P[OFFSET, THETA] -= turn
             P[OFFSET, OFFSET] += turn
-    if level >= 3:
+    if level >= 3 and not model.soft_gate:
         for q in range(RADIUS_RIGHT, TRACK + 1):
             P[q, q] += (0.05 * x[q]) ** 2
 
@@ -230,7 +231,7 @@ def _take_fix(
             memory[MEM_FIX_LEVEL] += 1.0
             memory[MEM_RECOVERIES] += 1.0
             memory[MEM_FIX_REJECTED] = 0.0
-            _open_position(belief, nu_e, nu_n, memory[MEM_FIX_LEVEL], model.use_offset)
+            _open_position(belief, nu_e, nu_n, memory[MEM_FIX_LEVEL], model)
             return
         if not model.soft_gate:
             return

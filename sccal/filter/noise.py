@@ -27,7 +27,8 @@ from scipy.special import ndtri
 from sccal.align import Aligned, Timeline, build_timeline
 from sccal.align.accuracy import table_sigma_m
 from sccal.arrays import Bools, Floats
-from sccal.filter.iterate import At, Extension, RunProblem, iterate, whole_nll
+from sccal.filter.forward import ForwardPass
+from sccal.filter.iterate import At, Extension, LaidOut, RunProblem, iterate, whole_nll
 from sccal.filter.levels import Levels, Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, coarse_constants
@@ -46,13 +47,12 @@ MOST_CLIMBS = 4
 TOGETHER_NATS = 1.0
 """Ends of two climbs that are nearer than this are one."""
 ROUNDS = 3
-DIFFERENCE, CURVATURE_STEP = 0.01, 0.05
-"""Steps of the finite differences in the logarithms: below what any level is known to."""
-LEAST_CURVATURE = 0.25
-"""That of a prior of width two, the widest in the table."""
-MOST_STEPS, LONGEST_STEP, SETTLED_NATS = 25, 1.5, 0.1
-SHARES = (1.0, 0.5, 0.2, 0.05)
-"""Of a step, tried at once."""
+DIFFERENCE = 1e-3
+"""Step of the finite differences in the logarithms: far below what any level is known to."""
+MOST_STEPS, LONGEST_STEP, SETTLED_NATS = 25, 1.5, 0.2
+SHARES = (0.5, 0.2, 0.05)
+"""Of a step, tried at once where the whole of it brings less than ENOUGH of what it promised."""
+ENOUGH = 0.1
 MISFIT = "misfit"
 """Where a noise comes from, that of misfit_noise."""
 MISFIT_HZ, MISFIT_PATH_HZ = (2.0, 1.0, 20.0), 5.0
@@ -85,8 +85,6 @@ class End:
     cost: float
     logs: Floats
     at: At
-    inverse: Floats
-    """Of the curvature there, as far as the climb found it: where another climb may begin."""
 
 
 def estimate_noise(
@@ -134,7 +132,7 @@ def estimate_noise(
     best, apart = search.top(coarse, known, rough, reach)
     if reach is Reach.ROUGH:
         return replace(search.noise(best.logs), apart_nats=apart), best.at
-    found = search.climbed(fine, best.logs, best.at, best.inverse)
+    found = search.climbed(fine, best.logs, best.at)
     return replace(search.noise(found.logs), apart_nats=apart), found.at
 
 
@@ -210,7 +208,7 @@ class Search:
         """The best end of several climbs, and by how much the next best is worse (nats)."""
         points = [*near, self.levels.centre, *self.points()[: reach.value]]
         with at_once() as map_at_once:
-            costs = np.array(list(map_at_once(self._cost_at(timeline, points[0], at), points)))
+            costs = np.array(list(map_at_once(self.about(timeline, at).cost, points)))
         ends: list[End] = []
         for place in np.argsort(costs)[:MOST_CLIMBS]:
             ends.append(self.climbed(timeline, points[int(place)], at))
@@ -219,144 +217,175 @@ class Search:
                 break
         return ends[0], ends[1].cost - ends[0].cost
 
-    def climbed(self, timeline: Timeline, logs: Floats, at: At, inverse: Floats | None = None) -> End:
+    def climbed(self, timeline: Timeline, logs: Floats, at: At) -> End:
         """From a point to the top of its hill: levels and constants in turns."""
-        cost, at = self.settled(timeline, logs, at)
+        cost, here = self.settled(logs, self.about(timeline, at))
         for _ in range(ROUNDS):
-            climbed, inverse = self._climb(timeline, logs, at, inverse)
+            climbed = self._climb(here, logs)
             before = cost
-            settled, there = self.settled(timeline, climbed, at)
+            settled, there = self.settled(climbed, here)
             if settled < cost:
-                cost, logs, at = settled, climbed, there
+                cost, logs, here = settled, climbed, there
             if cost > before - 0.5 * TOGETHER_NATS:
                 break
-        assert inverse is not None
-        return End(cost, logs, at, inverse)
+        return End(cost, logs, here.at)
 
-    def settled(self, timeline: Timeline, logs: Floats, at: At) -> tuple[float, At]:
-        """Cost at given noise with the constants fitted to it, and these."""
-        problem = self.problem(timeline, logs)
-        mode, found = iterate(problem, at, max_rounds=2, with_sigmas=False)
-        fitted = At(Constants.of(mode), mode[4:], found if problem.extra else None)
-        candidates = (at, fitted)
-        costs = [self.cost(timeline, logs, one) for one in candidates]
+    def about(self, timeline: Timeline, at: At) -> About:
+        """What any levels cost where the constants and effects are these."""
+        return About(self, timeline, at, self.problem(timeline, self.levels.centre).laid_out(at))
+
+    def settled(self, logs: Floats, here: About) -> tuple[float, About]:
+        """Cost at given noise with the constants fitted to it, and about where these are."""
+        problem = self.problem(here.timeline, logs)
+        mode, found = iterate(problem, here.at, max_rounds=2, with_sigmas=False)
+        fitted = self.about(here.timeline, At(Constants.of(mode), mode[4:], found if problem.extra else None))
+        candidates = (here, fitted)
+        costs = [one.cost(logs) for one in candidates]
         better = int(np.argmin(costs))
         return costs[better], candidates[better]
 
-    def cost(self, timeline: Timeline, logs: Floats, at: At) -> float:
-        """Negative log-posterior of some levels, the constants and effects marginalised about where they are."""
-        return self._cost_at(timeline, logs, at)(logs)
-
-    def _climb(self, timeline: Timeline, logs: Floats, at: At, inverse: Floats | None) -> tuple[Floats, Floats]:
-        """The most likely levels from a point, the linearisation fixed, and the inverse curvature there."""
+    def _climb(self, here: About, logs: Floats) -> Floats:
+        """The most likely levels from a point, the linearisation fixed."""
         free = self.levels.free
-        cost_of = self._cost_at(timeline, logs, at)
         with at_once() as map_at_once:
 
-            def costs(points: Sequence[Floats]) -> Floats:
-                return np.array(list(map_at_once(lambda point: cost_of(_with(logs, free, point)), list(points))))
+            def look(points: Sequence[Floats]) -> list[Look]:
+                return list(map_at_once(lambda point: here.look(_with(logs, free, point)), list(points)))
 
-            found, inverse = descend(costs, logs[free], self.levels.low[free], self.levels.high[free], inverse)
-        return _with(logs, free, found), inverse
-
-    def _cost_at(self, timeline: Timeline, logs: Floats, at: At) -> Callable[[Floats], float]:
-        """Cost of any levels, the linearisation and all that depends on it computed once."""
-        problem = self.problem(timeline, logs)
-        clear = problem.clear_steps(at.constants)
-        columns = problem.columns(at, clear)
-        start = problem.start_given(columns, at.values)
-
-        def cost(level: Floats) -> float:
-            problem = self.problem(timeline, level)
-            found = problem.passed(at, clear, columns, start, with_sigmas=False)
-            value = whole_nll(problem, at, found) + self.levels.price(level)
-            return value if np.isfinite(value) else 1e12
-
-        return cost
+            found = descend(look, logs[free], self.levels.low[free], self.levels.high[free])
+        return _with(logs, free, found)
 
 
-def descend(
-    costs: Callable[[Sequence[Floats]], Floats],
-    start: Floats,
-    low: Floats,
-    high: Floats,
-    inverse: Floats | None = None,
-) -> tuple[Floats, Floats]:
-    """The least of a smooth function within bounds, by a quasi-Newton method (BFGS; Nocedal and Wright 2006, 6.1).
+@dataclass(frozen=True)
+class About:
+    """One linearisation: what any levels cost there, all that depends on it computed once."""
+
+    search: Search
+    timeline: Timeline
+    at: At
+    laid: LaidOut
+
+    def cost(self, logs: Floats) -> float:
+        """Negative log-posterior of some levels, the constants and effects marginalised about where they are."""
+        return self.look(logs).cost
+
+    def look(self, logs: Floats) -> Look:
+        """The same, with what its curvature follows from."""
+        problem = self.search.problem(self.timeline, logs)
+        found = problem.passed(self.at, self.laid, with_sigmas=False)
+        cost = whole_nll(problem, self.at, found) + self.search.levels.price(logs)
+        if not np.isfinite(cost):
+            return Look(1e12, np.zeros(0))
+        levels = self.search.levels
+        prior = ((logs - levels.centre) / levels.width)[levels.free]
+        return Look(cost, np.concatenate((prior, signs_of(found))))
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a point costs, and quantities (n,) in whose changes, squared and added up, its curvature shows."""
+
+    cost: float
+    signs: Floats
+
+
+def signs_of(found: ForwardPass) -> Floats:
+    """Standardised innovations and half the logarithms of their variances (n,); NaN for outliers.
+
+    For innovations ν with variances s the expected curvature of the negative log-likelihood is ½ (∂s/s)² + (∂ν)²/s,
+    added up (Fisher's information; Schweppe 1965), and that is the expectation of (∂(ν/√s))² + (½ ∂ log s)².
+    """
+    see, snn, sen = found.fix_var_m2.T
+    rest = snn - sen**2 / see
+    rest_nu = found.fix_nu_m[:, 1] - sen / see * found.fix_nu_m[:, 0]
+    nu = np.concatenate((found.heading_nu_rad, found.fix_nu_m[:, 0], rest_nu))
+    var = np.concatenate((found.heading_var_rad2, see, rest))
+    taken = np.concatenate((found.heading_accepted, found.fix_accepted, found.fix_accepted))
+    signs = np.concatenate((nu / np.sqrt(var), 0.5 * np.log(var)))
+    return np.where(np.concatenate((taken, taken)), signs, np.nan)
+
+
+def descend(look: Callable[[Sequence[Floats]], list[Look]], start: Floats, low: Floats, high: Floats) -> Floats:
+    """The least of a negative log-posterior within bounds, by Fisher's scoring.
 
     Parameters
     ----------
-    costs
-        Evaluates several points (k,) at once, which is what several cores are good for.
+    look
+        Looks at several points (k,) at once, which is what several cores are good for.
     start, low, high
         (k,) where to begin, and the bounds.
-    inverse
-        (k, k) inverse curvature near the start, where one is known. Without it second differences along the axes begin
-        the matrix: levels that thousands of readings show and levels that the prior holds differ by a factor of a
-        thousand.
 
     Returns
     -------
-    tuple
-        The point (k,), and the inverse curvature there as far as it was found.
+    Floats
+        The point (k,).
     """
     here = np.clip(start, low, high)
-    cost, slope, fresh = np.inf, np.zeros(start.size), False
-    if inverse is not None:
-        cost, slope = _slope(costs, here, high)
+    cost, slope, curvature = _around(look, here, high)
+    longest, before = np.full(here.size, LONGEST_STEP), np.zeros(here.size)
     for _ in range(MOST_STEPS):
-        if inverse is None:
-            here, cost, slope, inverse = _curved(costs, here, low, high)
-            fresh = True
-        held = ((here <= low) & (slope > 0.0)) | ((here >= high) & (slope < 0.0))
-        step = np.where(held, 0.0, -inverse @ np.where(held, 0.0, slope))
-        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-        if -float(slope @ step) < SETTLED_NATS:
+        step = _step(here, slope, curvature, low, high, longest)
+        promised = -float(slope @ step)
+        if promised < SETTLED_NATS:
             break
-        points = [np.clip(here + share * step, low, high) for share in SHARES]
-        tried = costs(points)
-        best = int(np.argmin(tried))
-        if not tried[best] < cost:
-            if fresh:
+        # The whole step and what is around its end at once: mostly it is the right one.
+        there = np.clip(here + step, low, high)
+        reached, *around = _around(look, there, high)
+        if not reached < cost - ENOUGH * promised:
+            points = [np.clip(here + share * step, low, high) for share in SHARES]
+            tried = [one.cost for one in look(points)]
+            best = int(np.argmin(tried))
+            if tried[best] < min(cost, reached):
+                there = points[best]
+                reached, *around = _around(look, there, high)
+            elif not reached < cost:
                 break
-            inverse = None  # it promises what the function does not hold: by differences anew
+        # A level that goes to and fro is one whose curvature grows on the way: in shorter steps.
+        moved = there - here
+        longest = np.where(moved * before < 0.0, 0.4 * np.abs(before), np.minimum(2.0 * longest, LONGEST_STEP))
+        here, before, cost, (slope, curvature) = there, moved, reached, around
+    return here
+
+
+def _step(here: Floats, slope: Floats, curvature: Floats, low: Floats, high: Floats, longest: Floats) -> Floats:
+    """The way (k,) to where a parabola has its least within the bounds and so far at most.
+
+    By active sets: what would leave the box is held at its side, and let go again where the rest of the way turns it.
+    """
+    least, most = np.maximum(low - here, -longest), np.minimum(high - here, longest)
+    step, held = np.zeros(here.size), np.zeros(here.size, dtype=np.bool_)
+    for _ in range(10 * here.size):
+        free = ~held
+        wanted = step.copy()
+        rest = slope[free] + curvature[np.ix_(free, held)] @ step[held]
+        wanted[free] = -np.linalg.solve(curvature[np.ix_(free, free)], rest)
+        away = wanted - step
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.where(away > 0.0, (most - step) / away, np.where(away < 0.0, (least - step) / away, np.inf))
+        nearest = int(np.argmin(room))
+        if room[nearest] < 1.0:
+            step = np.clip(step + max(room[nearest], 0.0) * away, least, most)
+            held[nearest] = True
             continue
-        moved, before = points[best] - here, slope
-        here, fresh = points[best], False
-        cost, slope = _slope(costs, here, high, float(tried[best]))
-        turned = slope - before
-        bend = float(turned @ moved)
-        if bend > 1e-10:
-            left = np.eye(start.size) - np.outer(moved, turned) / bend
-            inverse = left @ inverse @ left.T + np.outer(moved, moved) / bend
-    if inverse is None:
-        inverse = np.eye(start.size)
-    return here, inverse
+        step = wanted
+        pull = slope + curvature @ step
+        inward = np.where(held, np.where(step >= most, pull, -pull), 0.0)
+        if inward.max() <= 1e-9 * max(1.0, float(np.abs(slope).max())):
+            break
+        held[int(np.argmax(inward))] = False
+    return step
 
 
-def _slope(
-    costs: Callable[[Sequence[Floats]], Floats], here: Floats, high: Floats, cost: float | None = None
-) -> tuple[float, Floats]:
-    """Cost at a point (k,) and its derivatives (k,), by differences to the side where there is room."""
-    signs = np.where(here + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
-    beside = [here + sign * one for sign, one in zip(signs, np.eye(here.size), strict=True)]
-    found = costs(beside if cost is not None else [here, *beside])
-    if cost is None:
-        cost, found = float(found[0]), found[1:]
-    return cost, (found - cost) / signs
-
-
-def _curved(
-    costs: Callable[[Sequence[Floats]], Floats], start: Floats, low: Floats, high: Floats
-) -> tuple[Floats, float, Floats, Floats]:
-    """A point inside the bounds, its cost, derivatives (k,) and the inverse (k, k) of its curvatures along the axes."""
-    k, h = start.size, CURVATURE_STEP
-    here = np.clip(start, low + h, high - h)
-    steps = h * np.eye(k)
-    found = costs([here, *(here + steps), *(here - steps)])
-    cost, up, down = float(found[0]), found[1 : k + 1], found[k + 1 :]
-    second = np.maximum((up - 2.0 * cost + down) / h**2, LEAST_CURVATURE)
-    return here, cost, (up - down) / (2.0 * h), np.diag(1.0 / second)
+def _around(look: Callable[[Sequence[Floats]], list[Look]], here: Floats, high: Floats) -> tuple[float, Floats, Floats]:
+    """Cost at a point (k,), its derivatives (k,) and its curvature (k, k), by differences to where there is room."""
+    beside = np.where(here + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
+    middle, *others = look([here, *(here + np.diag(beside))])
+    slope = np.array([one.cost - middle.cost for one in others]) / beside
+    if any(one.signs.size != middle.signs.size for one in others) or not middle.signs.size:
+        return middle.cost, slope, np.eye(here.size)
+    turned = np.nan_to_num(np.array([one.signs - middle.signs for one in others]) / beside[:, None])
+    curvature = turned @ turned.T
+    return middle.cost, slope - 0.5 * beside * np.diag(curvature), curvature
 
 
 def _generalised_golden_ratio(dimensions: int) -> float:

@@ -205,7 +205,8 @@ def test_derivatives_from_raw_wheels_would_learn_the_track_from_slip(tmp_path):
     calibration, problem = calibrate_run(read(folder), CalibrationOptions(noise=GIVEN))
     true = truth(folder)[2]
     raw = problem.timeline.right_rad, problem.timeline.left_rad
-    plain = problem.begun(problem.at_centre(Constants(*truth(folder)[:3])), False, raw).finish()
+    at = problem.at_centre(Constants(*truth(folder)[:3]))
+    plain = problem.begun(at, False, problem.laid_out(at, raw)).finish()
     sigma = np.sqrt(plain.final_covariance[5, 5])
     track = calibration.parameters.track_m
     assert (plain.final_state[5] - true) / sigma > 5.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,6 +143,19 @@ def test_stretches_add_up_to_the_whole_less_the_first():
     assert len(whole.stretches) == 8
     assert RunLikelihood.of(problem, at).stretches == ()
     assert RunLikelihood.of(problem, at).nll == pytest.approx(whole.nll, abs=1e-6)
+
+
+def test_no_pass_of_an_estimate_unlearns_a_constant():
+    """Fixes that jump time and again make the filter open up; what it knew of radii and track it still knows."""
+    model = bare(duration_s=240.0)
+    problem, at = model.problems[0], model.at(0)
+    aligned = problem.aligned
+    jump = np.floor((aligned.fix_t_s - aligned.fix_t_s[0]) / 6.0)
+    jumping = replace(aligned, fix_east_m=aligned.fix_east_m + 30.0 * jump)
+    found = RunLikelihood.of(replace(problem, aligned=jumping), at)
+    assert found.path.recoveries >= 5
+    unit = np.sqrt(np.diag(problem.prior))
+    assert np.linalg.eigvalsh(found.precision * np.outer(unit, unit)).min() > -1e-3
 
 
 # What an effect brings on data that did not fit it

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sccal.filter.levels import Levels
-from sccal.filter.noise import POINTS, SPREAD, Search, descend, estimate_noise
+from sccal.filter.noise import POINTS, SPREAD, Look, Search, descend, estimate_noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import coarse_constants, find_start
 from tests.filter.logs import TrueNoise, aligned
@@ -28,15 +28,15 @@ LOGS = {
 # The way down
 
 
-def counted(function):
+def looked(function, signs):
     """As ``descend`` wants it, and how often it was asked."""
     asked = []
 
-    def costs(points):
+    def look(points):
         asked.extend(points)
-        return np.array([function(point) for point in points])
+        return [Look(float(function(point)), signs(point)) for point in points]
 
-    return costs, asked
+    return look, asked
 
 
 @settings(max_examples=60, deadline=None)
@@ -45,27 +45,28 @@ def test_the_least_of_levels_that_the_log_shows_unevenly_is_found(size, seed, lo
     """Some are shown by thousands of readings, some are held by the prior alone, and neighbours hang together."""
     rng = np.random.default_rng(seed)
     sigma = 10.0 ** (-0.5 * rng.uniform(0.0, log_condition, size))
-    root = np.eye(size) + 0.5 * rng.uniform(-1.0, 1.0) * np.eye(size, k=1)
-    curvature = root.T @ root / np.outer(sigma, sigma)
+    root = (np.eye(size) + 0.5 * rng.uniform(-1.0, 1.0) * np.eye(size, k=1)) / sigma
     least = rng.uniform(-1.5, 1.5, size)
-    costs, asked = counted(lambda x: 0.5 * (x - least) @ curvature @ (x - least))
-    found, _ = descend(costs, np.zeros(size), -FAR[:size], FAR[:size])
-    assert costs([found])[0] < 0.5
-    assert len(asked) < 26 * (size + 3)
+    look, asked = looked(lambda x: 0.5 * ((root @ (x - least)) ** 2).sum(), lambda x: root @ x)
+    found = descend(look, np.zeros(size), -FAR[:size], FAR[:size])
+    assert look([found])[0].cost < 0.5
+    assert len(asked) < 6 * (size + 1)
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(2, 7), st.integers(0, 10_000))
 def test_it_never_ends_higher_than_it_began_and_never_outside(size, seed):
+    """Even where the curvature that is expected is not the one there is, and there are several hills."""
     rng = np.random.default_rng(seed)
     low, high = -rng.uniform(0.5, 2.0, size), rng.uniform(0.5, 2.0, size)
     least = rng.uniform(-3.0, 3.0, size)
     weights = 10.0 ** rng.uniform(0.0, 3.0, size)
     start = rng.uniform(low, high)
-    costs, asked = counted(lambda x: float((weights * (x - least) ** 2).sum() + np.sin(5.0 * x).sum()))
-    found, _ = descend(costs, start, low, high)
-    inside = np.clip(start, low + 0.05, high - 0.05)
-    assert costs([found])[0] <= costs([inside])[0]
+    look, asked = looked(
+        lambda x: (weights * (x - least) ** 2).sum() + np.sin(5.0 * x).sum(), lambda x: np.sqrt(weights) * x
+    )
+    found = descend(look, start, low, high)
+    assert look([found])[0].cost <= look([start])[0].cost
     assert np.all((found >= low) & (found <= high))
     reached = np.array(asked)
     assert np.all((reached >= low - 1e-9) & (reached <= high + 1e-9))
@@ -78,17 +79,32 @@ def test_a_least_at_a_bound_is_found_there(size, seed):
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(size, size)) / np.sqrt(size)
     curvature = 30.0 * (root @ root.T + 0.1 * np.eye(size))
+    factor = np.linalg.cholesky(curvature).T
     low, high = np.full(size, -2.0), np.full(size, 2.0)
     least = rng.uniform(-1.0, 1.0, size)
     least[0] = -4.0
-    costs, _ = counted(lambda x: float(0.5 * (x - least) @ curvature @ (x - least)))
-    found, _ = descend(costs, np.zeros(size), low, high)
+    look, _ = looked(lambda x: 0.5 * (x - least) @ curvature @ (x - least), lambda x: factor @ x)
+    found = descend(look, np.zeros(size), low, high)
     rest = np.arange(1, size)
     given_the_bound = least.copy()
     given_the_bound[0] = -2.0
     given_the_bound[rest] += np.linalg.solve(curvature[np.ix_(rest, rest)], -2.0 * curvature[rest, 0])
     if np.all(np.abs(given_the_bound) <= 2.0):
-        assert costs([found])[0] < costs([given_the_bound])[0] + 0.5
+        assert look([found])[0].cost < look([given_the_bound])[0].cost + 0.5
+
+
+def test_the_curvature_that_innovations_promise_is_that_of_the_cost(search):
+    """Fisher's information is what second differences of the negative log-likelihood are on average."""
+    log = search.aligned
+    noise, at = estimate_noise(log, search.start, FilterOptions(), HEADING_HZ)
+    _, events = search.timelines(HEADING_HZ)
+    here, logs = search.about(events, at), search.levels.logs(noise)
+    step = 0.05 * np.eye(7)
+    looks = {sign: [here.look(logs + sign * one) for one in step] for sign in (-1, 1)}
+    found = [(b.cost - 2.0 * here.cost(logs) + a.cost) / 0.05**2 for a, b in zip(looks[-1], looks[1], strict=True)]
+    expected = [np.nansum((b.signs - a.signs) ** 2) / 0.1**2 for a, b in zip(looks[-1], looks[1], strict=True)]
+    shown = [0, 1, 4, 6]
+    np.testing.assert_allclose(np.array(expected)[shown], np.array(found)[shown], rtol=0.35)
 
 
 # Where it is looked
@@ -163,8 +179,8 @@ def test_what_is_found_is_as_likely_as_the_truth(path):
     rough = search.problem(events, search.levels.centre).at_centre(coarse_constants(log, start))
     costs = []
     for noise in (found, truth):
-        logs, at = search.levels.logs(noise), rough
+        logs, here = search.levels.logs(noise), search.about(events, rough)
         for _ in range(2):
-            cost, at = search.settled(events, logs, at)
+            cost, here = search.settled(logs, here)
         costs.append(cost)
     assert costs[0] <= costs[1] + 1.0
