@@ -14,7 +14,7 @@ import numpy as np
 from sccal.align import Aligned
 from sccal.arrays import Floats
 from sccal.diagnose.criteria import LEAST_NATS, LEAST_T, SEARCH_NATS
-from sccal.diagnose.shapes import Found, best_forms, find_moments, refined
+from sccal.diagnose.shapes import Found, best_forms, find_moments, refined, settled
 from sccal.effects.effect import Parameter
 from sccal.evidence.candidates import Candidates, gather_candidates
 from sccal.evidence.extension import Free
@@ -201,10 +201,12 @@ def _moments(loop: Loop) -> list[Found]:
         return []
     known = [one.free.effect.name for one in loop.moments]
     of_runs = each(lambda run: find_moments(loop.model, run, known), range(len(loop.model.problems)))
-    found = sorted((one for several in of_runs for one in several), key=lambda one: -one.gain_nats)
-    for moment in found[:1]:
-        loop.shape_sigmas[moment.free.key] = dict(moment.shape_sigmas)
-    return found[:1]
+    for rough in sorted((one for several in of_runs for one in several), key=lambda one: -one.gain_nats):
+        moment = settled(loop.model, rough)
+        if moment.stands_out:
+            loop.shape_sigmas[moment.free.key] = dict(moment.shape_sigmas)
+            return [moment]
+    return []
 
 
 def _take_back(loop: Loop) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -74,6 +75,11 @@ class Found:
         return float(np.max(np.abs(self.values) / np.maximum(least, 1e-12)))
 
     @property
+    def stands_out(self) -> bool:
+        """Whether it is likely, sure and large enough to compete."""
+        return self.gain_nats >= LEAST_NATS and self.t >= SEARCH_T and self.size >= 1.0
+
+    @property
     def accepted(self) -> Accepted:
         """As it enters a model."""
         return Accepted(self.free, self.run)
@@ -119,11 +125,7 @@ class Scan:
         }
 
     def trial(
-        self,
-        effect: Effect,
-        shapes: Mapping[str, float],
-        prior_scale: float = WIDEST,
-        around: Floats | None = None,
+        self, effect: Effect, shapes: Mapping[str, float], prior_scale: float = WIDEST, around: Floats | None = None
     ) -> tuple[float, Floats, Floats]:
         """Gain in nats, values and sigmas of the effect's free parameters with its shapes as given.
 
@@ -140,6 +142,37 @@ class Scan:
         gain = self.base_nll - nll
         return (gain if np.isfinite(gain) else -np.inf), found.final_state[here].copy(), sigmas
 
+    def each_alone(self, effects: Sequence[Effect], shapes: Mapping[str, float]) -> list[tuple[float, Floats, Floats]]:
+        """The same for several effects with these shapes, each as if the others were not there, by one pass.
+
+        With all of them free, one alone is what is left where the others are zero: their density at zero before and
+        after the data is the ratio of the evidence without and with them (Dickey 1971), and the rest of the posterior
+        follows from the condition.
+        """
+        new = [Free(effect, dict(shapes), WIDEST) for effect in effects]
+        first = self.at.values.size
+        extension = FreeEffects((*self.effects, *new))
+        problem = replace(self.problem, extension=extension)
+        nll, found = self._pass(problem, At(self.at.constants, self._with_zeros(extension), self.at.path))
+        here = slice(BASE_STATES + first, BASE_STATES + extension.prior_sigmas.size)
+        prior = extension.prior_sigmas[first:]
+        mean = found.final_state[here] / prior
+        covariance = found.final_covariance[here, here] / np.outer(prior, prior)
+        ends = np.cumsum([0, *(len(one.parameters) for one in new)])
+        alone = []
+        for begin, end in pairwise(ends.tolist()):
+            one = np.zeros(prior.size, dtype=np.bool_)
+            one[begin:end] = True
+            lost, left, spread = _given_zero(mean, covariance, one)
+            gain = self.base_nll - nll + lost
+            values, sigmas = left * prior[one], np.sqrt(np.maximum(np.diag(spread), 1e-30)) * prior[one]
+            alone.append((gain if np.isfinite(gain) else -np.inf, values, sigmas))
+        return alone
+
+    def _with_zeros(self, extension: FreeEffects) -> Floats:
+        more = extension.prior_sigmas.size - self.at.values.size
+        return np.concatenate((self.at.values, np.zeros(more)))
+
     def best(self, effect: Effect, tries: Sequence[Mapping[str, float]]) -> tuple[Mapping[str, float], Floats]:
         """The most likely of some shapes, and the gains of all."""
         with at_once() as map_at_once:
@@ -147,26 +180,52 @@ class Scan:
         return tries[int(np.argmax(gains))], gains
 
 
+def _given_zero(mean: Floats, covariance: Floats, kept: Bools) -> tuple[float, Floats, Floats]:
+    """What the evidence gains where all but the kept of some parameters (k,) are zero, and the kept ones' posterior.
+
+    Parameters in units of their priors' sigmas: before the data each is N(0, 1).
+    """
+    rest = ~kept
+    if not rest.any():
+        return 0.0, mean, covariance
+    block, across = covariance[np.ix_(rest, rest)], covariance[np.ix_(kept, rest)]
+    weights = np.linalg.solve(block, mean[rest])
+    lost = -0.5 * float(mean[rest] @ weights) - 0.5 * float(np.linalg.slogdet(block)[1])
+    return (
+        lost,
+        mean[kept] - across @ weights,
+        covariance[np.ix_(kept, kept)] - across @ np.linalg.solve(block, across.T),
+    )
+
+
 def find_moments(model: Model, run: int, known: Sequence[str]) -> list[Found]:
-    """Every effect of a moment or a place that stands out in one run and is not known, the largest gain first."""
+    """Every effect of a moment or a place that stands out in one run and is not known, the largest gain first.
+
+    Roughly: see ``settled``.
+    """
     problem = model.problems[run]
     start_s, end_s = problem.aligned.span_s
     if end_s - start_s < 4.0 * EDGE_S:
         return []
     scan = Scan(problem, model.at(run))
     grid = np.linspace(EDGE_S, end_s - start_s - EDGE_S, GRID)
-    peaks = {stream: _peaks(*one, start_s, end_s) for stream, one in scan.suspicious.items()}
     found: list[Found] = []
-    for effect in CATALOGUE.values():
-        if effect.name in known:
-            continue
-        suspects = peaks[effect.suspect_stream]
-        if effect.search == "moment":
-            found += _search_time(scan, problem, run, effect, suspects, grid)
-        elif effect.search == "place":
-            found += _search_place(scan, run, effect, suspects, grid)
-    good = [one for one in found if one.gain_nats >= LEAST_NATS and one.t >= SEARCH_T and one.size >= 1.0]
-    return sorted(good, key=lambda one: -one.gain_nats)
+    for stream, innovations in scan.suspicious.items():
+        suspects = _peaks(*innovations, start_s, end_s)
+        here = [one for one in CATALOGUE.values() if one.suspect_stream == stream and one.name not in known]
+        found += _search_time(scan, run, [one for one in here if one.search == "moment"], suspects, grid)
+        for effect in here:
+            if effect.search == "place":
+                found += _search_place(scan, run, effect, suspects, grid)
+    return sorted((one for one in found if one.stands_out), key=lambda one: -one.gain_nats)
+
+
+def settled(model: Model, rough: Found) -> Found:
+    """A moment to the reading, a place with its errors."""
+    problem, at = model.problems[rough.run], model.at(rough.run)
+    if rough.free.effect.search == "moment":
+        return _to_the_reading(problem, at, rough)
+    return _with_place_errors(Scan(problem, at), rough)
 
 
 def best_forms(model: Model, candidates: Candidates, kept: Sequence[Accepted]) -> list[Accepted]:
@@ -254,34 +313,45 @@ def _without(model: Model, run: int, accepted: Accepted) -> Scan:
     return Scan(replace(problem, extension=extension), At(at.constants, at.values[keep], at.path))
 
 
-def _search_time(
-    scan: Scan, whole: RunProblem, run: int, effect: Effect, suspects: Floats, grid: Floats
-) -> list[Found]:
-    beside = BEFORE_S if effect.suspect_stream == "motion" else BESIDE_S
+def _search_time(scan: Scan, run: int, effects: Sequence[Effect], suspects: Floats, grid: Floats) -> list[Found]:
+    """Effects that show in the same innovations, all at the same moments."""
+    if not effects:
+        return []
+    beside = BEFORE_S if effects[0].suspect_stream == "motion" else BESIDE_S
     around = np.clip((suspects[:, None] + np.array(beside)).ravel(), grid[0], grid[-1])
-    tries = np.concatenate((around, grid))
-    best, gains = scan.best(effect, [{"at_s": float(s)} for s in tries])
-    ordinary = _ordinary(gains[around.size :])
-    step = float(grid[1] - grid[0]) if not np.isin(best["at_s"], around) else WINDOW_S
-    limit = (float(grid[0]), float(grid[-1]))
+    tried = np.concatenate((around, grid))
+
+    def gains_at(some_s: Floats) -> Floats:
+        with at_once() as map_at_once:
+            found = map_at_once(lambda at_s: scan.each_alone(effects, {"at_s": at_s}), some_s.tolist())
+            return np.array([[gain for gain, _, _ in several] for several in found])
+
+    gains = gains_at(tried)
+    ordinary = [_ordinary(of_one) for of_one in gains[around.size :].T]
+    best_s = float(tried[int(np.argmax(gains.max(axis=1)))])
+    step = float(grid[1] - grid[0]) if best_s not in around else WINDOW_S
     for _ in range(ZOOMS):
-        nearby = np.clip(best["at_s"] + step * np.linspace(-1.0, 1.0, POINTS), *limit)
-        best, _ = scan.best(effect, [{"at_s": float(s)} for s in nearby])
+        nearby = np.clip(best_s + step * np.linspace(-1.0, 1.0, POINTS), grid[0], grid[-1])
+        tried, gains = np.concatenate((tried, nearby)), np.vstack((gains, gains_at(nearby)))
+        best_s = float(tried[int(np.argmax(gains.max(axis=1)))])
         step *= 2.0 / (POINTS - 1)
-    return [_settled(whole, one, scan) for one in _found(scan, run, effect, best, ordinary)]
+    found = []
+    for effect, of_one, usual in zip(effects, gains.T, ordinary, strict=True):
+        found += _found(scan, run, effect, {"at_s": float(tried[int(np.argmax(of_one))])}, usual)
+    return found
 
 
-def _settled(whole: RunProblem, rough: Found, scan: Scan) -> Found:
+def _to_the_reading(problem: RunProblem, at: At, rough: Found) -> Found:
     """The moment to the reading: a parameter that is free one reading early is fitted to that reading."""
-    timeline = whole.timeline
+    timeline = problem.timeline
     headings = rough.free.effect.suspect_stream == "headings"
     index = timeline.heading_index if headings else timeline.fix_index
-    of = whole.aligned.heading_t_s if headings else whole.aligned.fix_t_s
-    t_s = of[index] - whole.aligned.span_s[0]
+    of = problem.aligned.heading_t_s if headings else problem.aligned.fix_t_s
+    t_s = of[index] - problem.aligned.span_s[0]
     near = t_s[np.abs(t_s - rough.free.shapes["at_s"]) < 2.0 / FIX_HZ]
     if near.size < 2:
         return rough
-    fine = Scan(whole, scan.at, timeline)
+    fine = Scan(problem, at, timeline)
     between = 0.5 * (near[1:] + near[:-1])
     best, _ = fine.best(rough.free.effect, [{"at_s": float(s)} for s in between[:: max(between.size // 24, 1)]])
     _, values, sigmas = fine.trial(rough.free.effect, best)
@@ -312,7 +382,7 @@ def _search_place(scan: Scan, run: int, effect: Effect, suspects: Floats, grid: 
         best, _ = scan.best(effect, [{**best, "radius_m": best["radius_m"] * k} for k in (0.7, 0.85, 1.0, 1.2, 1.4)])
         if best == before:
             step *= 0.5
-    return [_with_place_errors(scan, one) for one in _found(scan, run, effect, best, _ordinary(usual))]
+    return _found(scan, run, effect, best, _ordinary(usual))
 
 
 def _with_place_errors(scan: Scan, found: Found) -> Found:

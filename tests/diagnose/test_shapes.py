@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sccal.diagnose.criteria import LEAST_NATS, SEARCH_T
-from sccal.diagnose.shapes import Found, find_moments, shape_sigma
+from sccal.diagnose.shapes import Found, find_moments, settled, shape_sigma
 from sccal.effects.catalogue import CATALOGUE
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, refitted
@@ -17,8 +17,10 @@ from tests.evidence.logs import bare
 
 @cache
 def found(*texts: str, path: str = "general") -> tuple[Found, ...]:
-    """Everything that stands out in one log."""
-    return tuple(find_moments(bare(*texts, path=path), 0, ()))
+    """Everything that stands out in one log, the first as it enters a model."""
+    model = bare(*texts, path=path)
+    first, *others = [*find_moments(model, 0, ()), None]
+    return () if first is None else (settled(model, first), *others[:-1])
 
 
 def best(text: str) -> Found:
