@@ -122,6 +122,11 @@ def track_step(rng: np.random.Generator, scenario: Scenario) -> Parameters:
     return {"ratio": pick_sign(rng) * log_uniform(rng, 0.04, 0.25), "at_s": moment_s(rng, scenario)}
 
 
+def smoothing(rng: np.random.Generator, scenario: Scenario) -> Parameters:
+    """A receiver or an AHRS that smooths over 0.3 to 1.5 s."""
+    return {"s": log_uniform(rng, 0.3, 1.5)}
+
+
 def heading_step(rng: np.random.Generator, scenario: Scenario) -> Parameters:
     """A heading that jumps by 3 to 30 degrees."""
     return {"deg": pick_sign(rng) * log_uniform(rng, 3.0, 30.0), "at_s": moment_s(rng, scenario)}
@@ -208,6 +213,8 @@ SIZES: dict[str, Sizer] = {
     "radius_step_left": radius_step,
     "radius_step_right": radius_step,
     "track_step": track_step,
+    "fix_smoothing": smoothing,
+    "heading_smoothing": smoothing,
 }
 COLUMN_SHARES = {
     "heading": (1.0, 6.0),

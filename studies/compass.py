@@ -1,6 +1,6 @@
 """What an AHRS reads of a heading: iron, fields, drifts, latency, noise and digits.
 
-reading(t) = offset + [θ + h(θ) low-passed + speed field + drift + scale + step + local field + columns](t − τ)
+reading(t) = offset + [θ smoothed + h(θ) low-passed + speed field + drift + scale + step + local field + columns](t − τ)
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def low_passed(values: FloatArray, tau_s: float) -> FloatArray:
 def compass_rad(motion: Motion, effects: Effects, columns: Sequence[Column]) -> FloatArray:
     """The AHRS without noise, offset and delay, in radians and not wrapped, on the grid of the truth."""
     t_s, heading = motion.t_s, motion.heading_rad
-    reading = heading.copy()
+    reading = low_passed(heading, effects.get("heading_smoothing", {}).get("s", 0.0)).copy()
     speed = motion.of_steps(motion.v_in_step_mps, t_s)
     for order, name, of_cos, of_sin in (
         (1, "hard_iron", "cos_deg", "sin_deg"),

@@ -28,7 +28,10 @@ def with_moved(found: Sequence[Finding], runs: Sequence[Aligned]) -> tuple[Findi
         if moved is None:
             continue
         if effect.name in findings:
-            findings[effect.name] = _together(findings[effect.name], moved)
+            whole = _together(findings.pop(effect.name), moved)
+            # A smoothed stream lags, is moved to where it fits best, and is moved back by the fit that knows better.
+            if abs(next(iter(whole.parameters.values())).value) >= effect.parameters[0].matters:
+                findings[effect.name] = whole
         else:
             first.append(moved)
     return (*first, *findings.values())

@@ -9,11 +9,13 @@ from sccal.effects.clock_skew import ClockSkew
 from sccal.effects.drive_slip import DriveSlip
 from sccal.effects.eccentric import EccentricLeft, EccentricRight
 from sccal.effects.effect import Effect
+from sccal.effects.fix_smoothing import FixSmoothing
 from sccal.effects.gnss_latency import GnssLatency
 from sccal.effects.hard_iron import HardIron
 from sccal.effects.heading_drift import HeadingDrift
 from sccal.effects.heading_latency import HeadingLatency
 from sccal.effects.heading_scale import HeadingScale
+from sccal.effects.heading_smoothing import HeadingSmoothing
 from sccal.effects.heading_step import HeadingStep
 from sccal.effects.lever_arm import LeverArm
 from sccal.effects.local_field import LocalField
@@ -58,7 +60,9 @@ CATALOGUE: dict[str, Effect] = {
         MissedLeft(),
         MissedRight(),
         GnssLatency(),
+        FixSmoothing(),
         HeadingLatency(),
+        HeadingSmoothing(),
         ClockSkew(),
         HardIron(),
         SoftIron(),

@@ -131,6 +131,10 @@ class Effect(ABC):
         """
         return None
 
+    def heading_delay_s(self, at: Mapping[str, float]) -> float:
+        """How much older the AHRS readings are than their stamps say."""
+        return 0.0
+
     @abstractmethod
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         """Columns of all parameters that are not shapes; ``at`` holds the current values of all (file units).

@@ -37,6 +37,9 @@ class HeadingLatency(Effect):
         when = "before" if found["s"].value > 0.0 else "after"
         return f"the AHRS readings show the heading of {size(found['s'])} s {when} their stamp"
 
+    def heading_delay_s(self, at: Mapping[str, float]) -> float:
+        return at["s"]
+
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         _, turn_rate = mean_rates(drive.steps, drive.headings.t_s, at["s"])
         return (Column("s", "heading", -turn_rate),)

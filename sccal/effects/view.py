@@ -134,6 +134,8 @@ class DriveView:
     fixes: Moments
     fix_delay_s: Floats | float = 0.0
     """How old each fix is as far as known (f,): it shows the robot as it stood so long before its stamp."""
+    heading_delay_s: float = 0.0
+    """The same of the AHRS readings."""
     logged: Mapping[str, Series] = field(default_factory=dict)
     """The log's further columns."""
 
@@ -150,6 +152,10 @@ class DriveView:
     def at_fixes(self, of_steps: Floats) -> Floats:
         """A quantity of the motion events (n,) where the fixes show the robot (f,)."""
         return np.interp(self.fixes.t_s - self.fix_delay_s, self.steps.t_s, of_steps)
+
+    def at_headings(self, of_steps: Floats) -> Floats:
+        """The same where the AHRS readings show the robot (h,)."""
+        return np.interp(self.headings.t_s - self.heading_delay_s, self.steps.t_s, of_steps)
 
     def _at_steps(self, of_headings: Floats) -> Floats:
         return np.interp(self.steps.t_s, self.headings.t_s, of_headings)

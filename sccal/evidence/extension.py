@@ -51,13 +51,15 @@ class Free:
     def placed(self, view: DriveView, values: Sequence[float], first: int) -> list[Placed]:
         """Its columns made at the values of its parameters, numbered from ``first``."""
         number = {one.name: first + k for k, one in enumerate(self.parameters)}
-        at = {one.name: float(value) for one, value in zip(self.parameters, values, strict=True)}
-        return [Placed(number[column.parameter], column) for column in self.effect.columns(view, {**at, **self.shapes})]
+        return [Placed(number[column.parameter], column) for column in self.effect.columns(view, self.at(values))]
+
+    def at(self, values: Sequence[float]) -> dict[str, float]:
+        """All its parameters, shapes too, by name."""
+        return {**{one.name: float(value) for one, value in zip(self.parameters, values, strict=True)}, **self.shapes}
 
     def delay_s(self, view: DriveView, values: Sequence[float]) -> Floats | None:
         """How old the effect makes the fixes (f,); None for an effect that has nothing to do with it."""
-        at = {one.name: float(value) for one, value in zip(self.parameters, values, strict=True)}
-        return self.effect.fix_delay_s(view, {**at, **self.shapes})
+        return self.effect.fix_delay_s(view, self.at(values))
 
     def turns(self, view: DriveView, values: Floats) -> Floats:
         """What the effect adds to the heading readings (h,) at some values of its parameters, rad."""
@@ -164,8 +166,7 @@ class FreeEffects:
         itself the reading turns with the robot. Secants, which the effects give, are D over p. Effects of a later
         stage are laid out in the drive that those of the earlier ones leave.
         """
-        delay_s = self._delay_s(view, values)
-        seen = view if delay_s is None else replace(view, fix_delay_s=delay_s)
+        seen = self._delayed(view, values)
         found = Laid(seen, _turned_rad(seen))
         if known is not None and found.turned_rad is known.turned_rad is None:
             found = known
@@ -186,11 +187,17 @@ class FreeEffects:
         ends = np.cumsum([0, *(len(free.parameters) for free in self.effects)]).tolist()
         return tuple((free, first, last) for free, (first, last) in zip(self.effects, pairwise(ends), strict=True))
 
-    def _delay_s(self, view: DriveView, values: Floats) -> Floats | None:
-        """How old each fix is at some values (f,); None where none is."""
-        delays = (free.delay_s(view, values[first:last].tolist()) for free, first, last in self._spans)
-        total = sum((one for one in delays if one is not None), np.zeros(view.fixes.t_s.size))
-        return total if total.any() else None
+    def _delayed(self, view: DriveView, values: Floats) -> DriveView:
+        """The drive with how old fixes and readings are at some values (f,)."""
+        fixes_s, headings_s = np.zeros(view.fixes.t_s.size), 0.0
+        for free, first, last in self._spans:
+            at = free.at(values[first:last].tolist())
+            delay_s = free.effect.fix_delay_s(view, at)
+            fixes_s = fixes_s if delay_s is None else fixes_s + delay_s
+            headings_s += free.effect.heading_delay_s(at)
+        if not fixes_s.any() and not headings_s:
+            return view
+        return replace(view, fix_delay_s=fixes_s if fixes_s.any() else 0.0, heading_delay_s=headings_s)
 
 
 def _after(view: DriveView, placed: Sequence[Placed], values: Floats) -> DriveView:

@@ -39,7 +39,9 @@ SIZES: dict[str, tuple[float, ...]] = {
     "missed_left": (0.02, 0.0),
     "missed_right": (0.02, 0.0),
     "gnss_latency": (0.15,),
+    "fix_smoothing": (0.9,),
     "heading_latency": (0.15,),
+    "heading_smoothing": (0.9,),
     "clock_skew": (300.0,),
     "hard_iron": (8.0, -12.0, 0.0),
     "soft_iron": (3.0, -2.0, 0.0),
@@ -52,6 +54,8 @@ SIZES: dict[str, tuple[float, ...]] = {
 }
 """Of each effect as in the field, parameters in order."""
 SHAPED: tuple[tuple[str, tuple[float, ...]], ...] = (
+    ("fix_smoothing", (0.3,)),
+    ("heading_smoothing", (2.5,)),
     ("missed_left", (0.02, 9.0)),
     ("missed_left", (-0.03, 7.0)),
     ("missed_right", (0.02, 9.0)),
