@@ -15,11 +15,11 @@ from benchmarks.timing import head, show, timed
 from sccal.align import align, build_timeline
 from sccal.calibration.options import CalibrationOptions
 from sccal.filter.iterate import RunProblem
-from sccal.filter.levels import Noise
 from sccal.filter.start import find_start
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
 from sccal.logs.run import discover, read_run
 from sccal.logs.write import gga, gst, rmc
+from sccal.results.noise import Noise
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.run import simulate_run

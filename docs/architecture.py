@@ -18,7 +18,7 @@ MADE = {
     "evidence": "Model, JointFit, Posterior",
     "calibration": "Calibration, VehicleCalibration",
     "diagnose": "Diagnosis",
-    "results": "the same, as files tell them",
+    "results": "every result, written and read",
     "report": "text, pages, figures",
     "cli": "a table and an exit code",
 }

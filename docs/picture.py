@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 
 from sccal.align import align
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Calibration
 from sccal.calibration.single import calibrate_run
 from sccal.diagnose.diagnose import diagnose
 from sccal.effects.catalogue import CATALOGUE
@@ -28,6 +27,7 @@ from sccal.report.figures import BLUE, PAPER, plain_ticks, styled, svg_text
 from sccal.report.figures_series import parameters_plan
 from sccal.report.plan import drawn
 from sccal.report.rows import Row, parameter_rows
+from sccal.results.calibration import Calibration
 from sccal.results.numbers import plain
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file

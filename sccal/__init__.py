@@ -19,18 +19,18 @@ Rooms, ground floor first; imports point down only
 1   geodesy      The local tangent plane: latitude and longitude to metres, and back.
 1   randomness   Named streams of random numbers, and the errors made of them.
 1   logs         From the bytes of a log to streams, and back.
-2   align        From streams to one timeline of events on one clock.
-2   convert      Runs from one form of log into another.
-2   simulate     A robot that never was, and the logs that it would have written.
-2   degrade      Existing logs rewritten with a fault, everything else byte for byte as it was.
-3   effects      What a real robot may have that the paper's model lacks, one file each.
-4   filter       The compiled filter, where it starts, and the noise that it assumes.
-5   evidence     Several runs as one problem, and what the data say of any set of effects.
-6   calibration  The constants of one run and of several, their statuses, and the outages that judge them.
-7   diagnose     The search for what the model lacks, judged before and after.
-7   experiments  The paper's experiments, with simulated drives and with one's own.
-7   inspect      What is in a log, before anything is estimated.
-8   results      Results as their files tell them.
+2   results      Every type of result, and the one way of writing and reading them.
+3   align        From streams to one timeline of events on one clock.
+3   convert      Runs from one form of log into another.
+3   simulate     A robot that never was, and the logs that it would have written.
+3   degrade      Existing logs rewritten with a fault, everything else byte for byte as it was.
+4   effects      What a real robot may have that the paper's model lacks, one file each.
+5   filter       The compiled filter, where it starts, and the noise that it assumes.
+6   evidence     Several runs as one problem, and what the data say of any set of effects.
+7   calibration  The constants of one run and of several, their statuses, and the outages that judge them.
+8   diagnose     The search for what the model lacks, judged before and after.
+8   experiments  The paper's experiments, with simulated drives and with one's own.
+8   inspect      What is in a log, before anything is estimated.
 9   summary      Many calibrations as one picture.
 9   gates        Conditions that results must keep, and whether they do.
 9   compare      What changed between two results beyond its uncertainty.

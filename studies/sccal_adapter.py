@@ -113,7 +113,7 @@ def counted_from(folder: Path) -> dict[str, float]:
     from sccal.logs.run import discover, read_run
 
     aligned = align(read_run(discover([folder])[0]))
-    return {name: Range.of([series]).reference for name, series in aligned.extras.items()}
+    return {name: Range.of([series.values]).reference for name, series in aligned.extras.items()}
 
 
 def as_told(effects: Effects, references: Mapping[str, float], counted: Mapping[str, float]) -> Effects:

@@ -11,7 +11,7 @@ import numpy as np
 from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m, usable
 from sccal.align.agreement import check_agreement
 from sccal.align.clock_motion import MotionClock
-from sccal.align.clocks import Clock, require_overlap
+from sccal.align.clocks import require_overlap
 from sccal.align.digits import OF_ROUNDING, step_of
 from sccal.align.heading_clock import HeadingClock
 from sccal.align.one_clock import (
@@ -40,6 +40,7 @@ from sccal.geodesy import TangentPlane
 from sccal.logs.names import AHRS_FILE
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.windows import Window, windows_on_clock, within
+from sccal.results.clock import Clock
 
 __all__ = ["Aligned", "Moved", "Series", "align", "yaw_to_enu"]
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from sccal.align.clock_fit import ClockFit, Fixes, WheelPath, fit_clock
 from sccal.align.clock_search import Lag, find_lags
-from sccal.align.clocks import Clock
 from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.logs.names import ENCODER_FILE
 from sccal.logs.streams import Notice
+from sccal.results.clock import Clock
 
 LATENCY_S = 0.3
 """Receivers and radio links are late by as much; what is more is a matter of clocks."""

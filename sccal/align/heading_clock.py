@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sccal.align.clocks import Clock
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.streams import Notice, Vehicle, WheelStream
+from sccal.results.clock import Clock
 
 LATENCY_S = 0.18
 """The filter's term is linear in the lag τ and errs by ½ τ² of the turn's acceleration: at 0.8 rad/s², as robots begin

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.align.accuracy import fix_covariance, usable
-from sccal.align.clocks import Clock, fixes_on_host_clock
+from sccal.align.clocks import fixes_on_host_clock
 from sccal.align.digits import OF_ROUNDING, step_of
 from sccal.arrays import Bools, Floats, Ints
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import FixStream, Notice, Reference
+from sccal.results.clock import Clock
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,12 @@ from sccal.batch.tasks import AlsoWritten, CalibrateRun, Done, Source
 from sccal.batch.vehicles import as_file_name, check_out, free_stem, identity_of
 from sccal.batch.whole import Member, vehicle_of_runs
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.errors import Failure, Interrupted, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource
 from sccal.report.write import begin_loading, write_vehicle
+from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.saved import RESULT_FILE, Saved, read_saved
 
 Told = Callable[[Source, Calibration | SccalError], None]

@@ -9,7 +9,6 @@ from sccal.align import Aligned, align
 from sccal.batch.vehicles import as_file_name, check_out, free_stem, identity_of
 from sccal.calibration.options import CalibrationOptions
 from sccal.diagnose.diagnose import diagnose
-from sccal.diagnose.result import Diagnosis
 from sccal.errors import Failure, as_known
 from sccal.filter.forward import say_if_compiling
 from sccal.filter.start import find_start
@@ -17,6 +16,7 @@ from sccal.logs.options import ReadOptions
 from sccal.logs.run import find_runs, read_run
 from sccal.report.diagnosis_write import write_diagnosis
 from sccal.report.write import begin_loading
+from sccal.results.diagnosis import Diagnosis
 
 
 def diagnose_paths(

@@ -8,10 +8,10 @@ from pathlib import Path
 from sccal.batch.vehicles import check_out
 from sccal.errors import DataError, Failure
 from sccal.experiments.experiments import run_experiments
-from sccal.experiments.result import Experiments
 from sccal.filter.forward import say_if_compiling
 from sccal.logs.run import find_runs
 from sccal.report.experiments_write import write_experiments
+from sccal.results.experiments import Experiments
 
 
 def experiment_on_paths(

@@ -9,11 +9,11 @@ from sccal.batch.vehicles import check_out
 from sccal.errors import Failure, as_known
 from sccal.filter.forward import say_if_compiling
 from sccal.inspect.inspect import inspect_run
-from sccal.inspect.result import Inspection
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import find_runs
 from sccal.report.inspect_write import write_inspection
 from sccal.report.write import begin_loading
+from sccal.results.inspection import Inspection
 
 
 def inspect_paths(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from sccal.batch.calibrating import Batch
 from sccal.gates.asked import Asked
-from sccal.gates.result import BatchOutcome
 from sccal.logs.write import write_text
 from sccal.report.index_write import write_summary
 from sccal.report.junit import junit_xml
 from sccal.report.step_summary import append_step_summary
+from sccal.results.gates import BatchOutcome
 from sccal.summary import summarise
 
 

@@ -19,8 +19,8 @@ import cattrs
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Calibration, Fixes, History, Provenance, Residuals, Trajectory
 from sccal.calibration.shared import SharedLikelihood
+from sccal.results.calibration import Calibration, Fixes, History, Provenance, Residuals, Trajectory
 
 RECORD_FILE = ".sccal.json"
 SCHEMA = "sccal.record/2"

@@ -24,20 +24,21 @@ from sccal.batch.record import FileMark, RunRecord, key_of, light, record_from, 
 from sccal.batch.remote import RemoteRun, fetched
 from sccal.calibration.beside_small import judged_held_out, model_of_run, widened
 from sccal.calibration.by_the_others import SaidByOthers, windows_by_others
+from sccal.calibration.judged_model import check_vehicle, notices_on_vehicle
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import OutageWindow, Provenance
-from sccal.calibration.saved_model import SavedModel, check_vehicle, notices_on_vehicle
 from sccal.calibration.shared import SharedLikelihood, own_answer
 from sccal.calibration.single import calibrate_run, prepare
 from sccal.errors import SccalError, as_known
 from sccal.filter.iterate import RunProblem
-from sccal.filter.levels import Noise
 from sccal.logs.inputs import input_files
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run
 from sccal.logs.streams import Run
 from sccal.report.model_json import digest_of
 from sccal.report.write import write_calibration
+from sccal.results.calibration import OutageWindow, Provenance
+from sccal.results.model import JudgedModel
+from sccal.results.noise import Noise
 
 COMPUTING = ("numpy", "scipy", "numba")
 """Whose versions may change a result in its last digits."""
@@ -204,7 +205,7 @@ def _named(options: Any, prefix: str = "") -> dict[str, str]:
     named: dict[str, str] = {}
     for one in fields(options):
         value = getattr(options, one.name)
-        if isinstance(value, SavedModel):
+        if isinstance(value, JudgedModel):
             named[one.name] = digest_of(value)
         elif is_dataclass(value) and one.name == "filter":
             named.update(_named(value))

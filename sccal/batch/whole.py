@@ -13,9 +13,9 @@ from sccal.batch.tasks import CalibrateRun, JudgeByOthers, LineariseAgain, one_t
 from sccal.calibration.beside_small import judged_held_out, model_of_vehicle, widened
 from sccal.calibration.by_the_others import SaidByOthers, held_out_of
 from sccal.calibration.combine import combine, combined, only_run
-from sccal.calibration.result import HeldOut, OutageWindow, VehicleCalibration
 from sccal.calibration.shared import MAX_ROUNDS, SharedFit, SharedLikelihood, far_off, pooled, stayed
 from sccal.errors import SccalError
+from sccal.results.calibration import HeldOut, OutageWindow, VehicleCalibration
 
 
 @dataclass(frozen=True)

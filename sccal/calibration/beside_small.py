@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from sccal.calibration.held_out import how, judge
-from sccal.calibration.result import Calibration, Estimate, HeldOut, Parameters, VehicleCalibration
 from sccal.evidence.extension import FreeEffects, name_in
 from sccal.evidence.model import CONTRADICTED, Model, Trust, bare_model, model_of, refitted
 from sccal.evidence.nuisance import sigmas_beside_small
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
+from sccal.results.calibration import Calibration, Estimate, HeldOut, Parameters, VehicleCalibration
 
 Effects = Mapping[str, Mapping[str, Estimate]]
 

@@ -13,12 +13,12 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.calibration.held_out import expected_of_one_more, how_of_runs
 from sccal.calibration.outage import run_with_outages, summarise
-from sccal.calibration.result import Calibration, HeldOut, OutageWindow
 from sccal.calibration.shared import SharedLikelihood, pooled
 from sccal.evidence.model import timeline_of, trust_in
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import CONSTANTS, OFFSET, THETA
 from sccal.filter.start import Constants
+from sccal.results.calibration import Calibration, HeldOut, OutageWindow
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.special import gammaincc
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Cause
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import RunProblem
+from sccal.results.calibration import Cause
 
 BINS = 16
 FEWEST_IN_BIN = 20

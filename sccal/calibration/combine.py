@@ -9,7 +9,6 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.calibration.outage import summarise
-from sccal.calibration.result import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 from sccal.calibration.status import effect_estimates, judge
 from sccal.evidence.extension import Free, FreeEffects
 from sccal.evidence.joint import JointFit, fit_jointly
@@ -17,6 +16,7 @@ from sccal.filter.iterate import At, RunProblem
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.logs.streams import Notice
+from sccal.results.calibration import Calibration, Drive, Estimate, Fit, Parameters, VehicleCalibration
 
 INCONSISTENT = 3.0
 OFFSET_OF_THE_RUN_RAD = np.radians(5.0)

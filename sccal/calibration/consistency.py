@@ -8,9 +8,9 @@ import numpy as np
 from scipy.special import chdtri
 
 from sccal.arrays import Bools, Floats
-from sccal.calibration.result import Consistency
 from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import RunProblem
+from sccal.results.calibration import Consistency
 
 STRETCHES = 48
 FEWEST_IN_STRETCH = 5

@@ -17,7 +17,6 @@ import numpy as np
 from sccal.align import Timeline
 from sccal.arrays import Floats
 from sccal.calibration.outage import isolated, run_with_outages, summarise
-from sccal.calibration.result import OutageWindow
 from sccal.evidence.joint import Places, fit_jointly, names_of
 from sccal.evidence.model import Model
 from sccal.evidence.parallel import each
@@ -25,6 +24,7 @@ from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import BASE_STATES, CONSTANTS, OFFSET, THETA
 from sccal.filter.start import Constants
+from sccal.results.calibration import OutageWindow
 
 STRETCHES = 4
 MIN_RUNS = 3

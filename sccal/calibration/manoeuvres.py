@@ -11,7 +11,7 @@ import numpy as np
 
 from sccal.align import Aligned
 from sccal.arrays import Bools, Floats
-from sccal.calibration.result import Manoeuvre
+from sccal.results.calibration import Manoeuvre
 
 STEP_S = 0.5
 STANDING_MPS = 0.02

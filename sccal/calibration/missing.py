@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Missing
 from sccal.effects.logged import logged_effects
 from sccal.effects.view import DriveView
 from sccal.evidence.candidates import without_shadows
@@ -28,6 +27,7 @@ from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import OFFSET
 from sccal.filter.noise import Reach
 from sccal.filter.start import Constants
+from sccal.results.calibration import Missing
 
 STRONG_NATS = 20.0
 """Odds of 5 × 10⁸: a quick look that is wrong would take the verdict from a good log."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from sccal.align import Aligned
-from sccal.calibration.saved_model import SavedModel
+from sccal.calibration.judged_model import free_effects
 from sccal.evidence.extension import FreeEffects
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
+from sccal.results.model import JudgedModel
+from sccal.results.noise import Noise
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class CalibrationOptions:
     """Windows whose fixes judge and do not teach; in the log's own time, or from its start."""
     effects: tuple[str, ...] = ()
     """Names of effects beyond the paper's model that the filter estimates too."""
-    model: SavedModel | None = None
+    model: JudgedModel | None = None
     """A model that was judged by a diagnosis: its effects, in its shapes, and the noise of the runs that it knows."""
 
     @property
@@ -42,7 +43,7 @@ class CalibrationOptions:
             DataError: where the log lacks the column that an effect is named by.
         """
         named = FreeEffects.named(self.effects, aligned)
-        judged = () if self.model is None else self.model.free_effects(aligned)
+        judged = () if self.model is None else free_effects(self.model, aligned)
         known = {free.effect.name for free in judged}
         rest = () if named is None else tuple(free for free in named.effects if free.effect.name not in known)
         return FreeEffects((*judged, *rest)) if judged or rest else None

@@ -11,9 +11,9 @@ import numpy as np
 
 from sccal.align import Aligned
 from sccal.arrays import Bools, Floats, Ints
-from sccal.calibration.result import Outage, OutageWindow
 from sccal.filter.forward import Filter
 from sccal.filter.start import Start
+from sccal.results.calibration import Outage, OutageWindow
 
 SETTLING_S = 20.0
 MIN_FIXES = 3

@@ -15,9 +15,9 @@ from sccal.align import Aligned, build_timeline
 from sccal.arrays import Bools, Floats, Ints
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import SETTLING_S, drift_in_window, fixes_of, run_with_outages, summarise
-from sccal.calibration.result import AgainstReference, Outage
 from sccal.filter.forward import Filter, ForwardPass
 from sccal.filter.iterate import RunProblem
+from sccal.results.calibration import AgainstReference, Outage
 
 LOSSES = "the stretches whose fixes are lost or withheld; the filter knows wheels and heading there, and fixes before"
 UNDISPLACED = "; judged by the fixes as they were before they were displaced"

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Calibration
 from sccal.evidence.joint import RunLikelihood, at_least, between_runs, disagreement
 from sccal.filter.forward import numeric_limits
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import CONSTANTS
 from sccal.filter.start import Constants
+from sccal.results.calibration import Calibration
 
 FAR_SIGMAS = 3.0
 STAYED_SIGMAS = 0.05

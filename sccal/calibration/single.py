@@ -22,16 +22,6 @@ from sccal.calibration.missing import look_for_missing
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import run_with_outages
 from sccal.calibration.reference import judged_forward
-from sccal.calibration.result import (
-    Calibration,
-    Drive,
-    Estimate,
-    Fit,
-    Fixes,
-    History,
-    Residuals,
-    Trajectory,
-)
 from sccal.calibration.status import effect_estimates, judge
 from sccal.calibration.unseen import unseen_parameters
 from sccal.evidence.extension import FreeEffects
@@ -42,6 +32,16 @@ from sccal.filter.noise import MISFIT_HZ, Reach, estimate_noise
 from sccal.filter.start import ODD_SCALE, Constants, find_start
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Notice, Run
+from sccal.results.calibration import (
+    Calibration,
+    Drive,
+    Estimate,
+    Fit,
+    Fixes,
+    History,
+    Residuals,
+    Trajectory,
+)
 
 SETTLED_S = 20.0
 STANDING_MPS = 0.02

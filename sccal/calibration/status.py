@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Drive, Estimate, Parameters, Status
 from sccal.effects.effect import Effect, Parameter
 from sccal.evidence.extension import FreeEffects
 from sccal.filter.forward import prior_covariance
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Vehicle
+from sccal.results.calibration import Drive, Estimate, Parameters, Status
+from sccal.results.noise import Noise
 
 UNOBSERVED_RATIO = 0.5
 """A parameter whose sigma is still more than this share of its prior's was not moved off the prior by the data."""

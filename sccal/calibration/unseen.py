@@ -11,12 +11,12 @@ import numpy as np
 
 from sccal.align import Timeline, build_timeline
 from sccal.arrays import Floats
-from sccal.calibration.result import Unseen
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
 from sccal.evidence.extension import Free, FreeEffects
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.start import Constants
+from sccal.results.calibration import Unseen
 
 FIRST_LOOK_S = 600.0
 STANDS_OUT = 6.75

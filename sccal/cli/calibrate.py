@@ -18,9 +18,9 @@ from sccal.errors import SccalError
 if TYPE_CHECKING:
     from sccal.batch import Batch, Progress
     from sccal.batch.tasks import Source
-    from sccal.calibration.result import Calibration
-    from sccal.gates.result import BatchOutcome
     from sccal.logs.options import ReadOptions
+    from sccal.results.calibration import Calibration
+    from sccal.results.gates import BatchOutcome
 
 
 @app.command()

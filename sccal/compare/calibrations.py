@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from sccal.compare.pairs import pairs_of
-from sccal.compare.result import Comparison, Figure, Side
 from sccal.logs.names import VEHICLE_FILE
+from sccal.results.comparison import Comparison, Figure, Side
 from sccal.results.saved import Saved
 
 FIGURES = (

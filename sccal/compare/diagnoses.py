@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Literal
 
 from sccal.compare.pairs import pairs_of
-from sccal.compare.result import Comparison, Figure, FoundEffect, Side
-from sccal.results.diagnosis import SavedDiagnosis
+from sccal.results.comparison import Comparison, Figure, FoundEffect, Side
 from sccal.results.saved import SavedEstimate
+from sccal.results.saved_diagnosis import SavedDiagnosis
 
 FIGURES = (
     "outage_rms_m",

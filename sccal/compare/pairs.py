@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from sccal.compare.result import Change, Pair
+from sccal.results.comparison import Change, Pair
 from sccal.results.differences import difference, why_not_estimated, why_own_log_only
 from sccal.results.saved import SavedEstimate
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from sccal.compare.calibrations import compare_calibrations
 from sccal.compare.diagnoses import compare_diagnoses
-from sccal.compare.result import Comparison, Kind
 from sccal.errors import DataError, UsageError
-from sccal.results.diagnosis import DIAGNOSIS_FILE, DIAGNOSIS_SCHEMA, read_diagnosis
+from sccal.results.comparison import Comparison, Kind
 from sccal.results.document import read_document
 from sccal.results.saved import RESULT_FILE, SCHEMA, VEHICLE_FILE, read_saved
+from sccal.results.saved_diagnosis import DIAGNOSIS_FILE, DIAGNOSIS_SCHEMA, read_diagnosis
 
 KINDS: dict[str, Kind] = {SCHEMA: "calibration", DIAGNOSIS_SCHEMA: "diagnosis"}
 """By schema."""

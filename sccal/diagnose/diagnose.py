@@ -15,8 +15,6 @@ from sccal.arrays import Floats
 from sccal.calibration.combine import pooled_drive
 from sccal.calibration.held_out import Judged, how, judge
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Estimate, OutageWindow, Parameters
-from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.calibration.single import describe_drive
 from sccal.calibration.status import judge as judge_parameters
 from sccal.diagnose.criteria import ALIKE_NATS, ALIKE_SHARE, CLEARLY_LESS, LEAST_NATS
@@ -24,14 +22,6 @@ from sccal.diagnose.excitation import excitation
 from sccal.diagnose.loop import Loop, Sized, need_more, run_loop, values_in
 from sccal.diagnose.moved import with_moved
 from sccal.diagnose.picture import picture_of
-from sccal.diagnose.result import (
-    Diagnosis,
-    Finding,
-    Judgement,
-    Placebo,
-    Ranked,
-    RunNoise,
-)
 from sccal.diagnose.unexplained import unexplained
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.logged import LoggedColumn
@@ -44,6 +34,16 @@ from sccal.evidence.posterior import PRICE_NATS, Posterior
 from sccal.evidence.saturated import posterior_of
 from sccal.filter.layout import OFFSET
 from sccal.filter.noise import Reach
+from sccal.results.calibration import Estimate, OutageWindow, Parameters
+from sccal.results.diagnosis import (
+    Diagnosis,
+    Finding,
+    Judgement,
+    Placebo,
+    Ranked,
+    RunNoise,
+)
+from sccal.results.model import JudgedEffect, JudgedModel
 
 BOOTSTRAP = 400
 RANKED = 8
@@ -318,7 +318,7 @@ def _parameters(model: Model, runs: Sequence[Aligned], spread: Floats | None = N
     return judge_parameters(values, covariance, runs[0].vehicle, model.problems[0].options, drive)
 
 
-def _saved(loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: Judged, unsure: _Unsure) -> SavedModel:
+def _saved(loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: Judged, unsure: _Unsure) -> JudgedModel:
     """The model that was judged, for other commands to start from."""
     effects = []
     for one in loop.sized:
@@ -326,7 +326,7 @@ def _saved(loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: J
         estimates, _ = _estimates(loop, accepted, unsure)
         effect = accepted.free.effect
         effects.append(
-            SavedEffect(
+            JudgedEffect(
                 name=effect.name,
                 title=effect.title,
                 parameters={name: each for name, each in estimates.items() if name not in accepted.free.shapes},
@@ -338,7 +338,7 @@ def _saved(loop: Loop, runs: Sequence[Aligned], parameters: Parameters, after: J
                 column=effect.range if isinstance(effect, LoggedColumn) else None,
             )
         )
-    return SavedModel(
+    return JudgedModel(
         vehicle=runs[0].vehicle.name,
         parameters=parameters,
         effects=tuple(effects),

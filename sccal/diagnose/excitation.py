@@ -8,7 +8,6 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.diagnose.criteria import BEYOND_SIGMAS
-from sccal.diagnose.result import Detectable, Inseparable, NotExcited
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
 from sccal.effects.logged import LoggedColumn
@@ -18,6 +17,7 @@ from sccal.evidence.extension import name_in
 from sccal.evidence.model import Model
 from sccal.evidence.nuisance import SMALL
 from sccal.evidence.posterior import CONSTANTS, Posterior
+from sccal.results.diagnosis import Detectable, Inseparable, NotExcited
 
 
 def excitation(

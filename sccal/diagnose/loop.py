@@ -24,9 +24,9 @@ from sccal.evidence.model import Accepted, Model, Trust, bare_model, refitted
 from sccal.evidence.parallel import each
 from sccal.evidence.posterior import PRICE_NATS, WIDEST, Posterior
 from sccal.evidence.saturated import Saturated, posterior_of, saturate
-from sccal.filter.levels import Noise
 from sccal.filter.noise import Reach
 from sccal.filter.options import FilterOptions
+from sccal.results.noise import Noise
 
 MOST_ROUNDS = 5
 STAYS = 0.3

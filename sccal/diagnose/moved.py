@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from sccal.align import Aligned
-from sccal.calibration.result import Estimate
 from sccal.diagnose.criteria import LEAST_T
-from sccal.diagnose.result import Finding
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.effect import Effect
+from sccal.results.calibration import Estimate
+from sccal.results.diagnosis import Finding
 
 
 def with_moved(found: Sequence[Finding], runs: Sequence[Aligned]) -> tuple[Finding, ...]:

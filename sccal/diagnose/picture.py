@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats
-from sccal.diagnose.result import Picture
 from sccal.effects.effect import Column
 from sccal.effects.logged import LoggedColumn
 from sccal.effects.view import DriveView, Moments
 from sccal.evidence.extension import Free, FreeEffects, view_run
 from sccal.evidence.model import Model
+from sccal.results.diagnosis import Picture
 
 BINS = 24
 LEAST = 3

@@ -12,13 +12,13 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.diagnose.criteria import PATTERN_NATS
 from sccal.diagnose.loop import Loop
-from sccal.diagnose.result import Unexplained
 from sccal.effects.patterns import PATTERNS, Pattern
 from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model, refitted
 from sccal.evidence.posterior import PRICE_NATS
 from sccal.evidence.saturated import posterior_of, saturate
 from sccal.filter.noise import Reach
+from sccal.results.diagnosis import Unexplained
 
 WINDOW_S = 10.0
 MOST_TRIED = 4

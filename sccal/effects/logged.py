@@ -11,7 +11,6 @@ kelvin): the heading offset, the radii and the track then mean what they are at 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,9 +18,9 @@ from sccal.align import Series
 from sccal.effects.effect import Column, Effect, Parameter, Port
 from sccal.effects.view import DriveView
 from sccal.errors import UsageError
+from sccal.results.model import Range
 from sccal.simulate.physics import Physics
 
-FAR_FROM_ZERO = 3.0
 HEADING_PRIOR_DEG = 10.0
 MOTION_PRIOR = 0.1
 PULL_PRIOR = 0.02
@@ -36,21 +35,6 @@ _PORTS: dict[str, tuple[Port, str, str, str]] = {
     "pull": ("turn", "per_m_per_unit", "rad/m", "pulls the robot to one side as it drives"),
 }
 """By the name in the files: port, parameter, unit of the effect, what it does."""
-
-
-@dataclass(frozen=True)
-class Range:
-    """Where a column's values lie, over all runs."""
-
-    reference: float
-    spread: float
-
-    @classmethod
-    def of(cls, series: Iterable[Series]) -> Range:
-        """Of all runs' values together."""
-        values = np.concatenate([one.values for one in series])
-        mean, spread = float(values.mean()), float(values.std())
-        return cls(mean if abs(mean) > FAR_FROM_ZERO * spread else 0.0, spread)
 
 
 class LoggedColumn(Effect):
@@ -96,5 +80,5 @@ def logged_effects(runs: Iterable[Mapping[str, Series]]) -> tuple[LoggedColumn, 
     for run in runs:
         for name, series in run.items():
             by_name.setdefault(name, []).append(series)
-    ranges = {name: Range.of(series) for name, series in by_name.items()}
+    ranges = {name: Range.of(one.values for one in series) for name, series in by_name.items()}
     return tuple(LoggedColumn(where, name, one) for name, one in ranges.items() if one.spread > 0 for where in _PORTS)

@@ -16,7 +16,6 @@ from sccal.evidence.joint import JointFit, fit_jointly, names_of
 from sccal.evidence.parallel import each
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, iterate, likeliest
-from sccal.filter.levels import Noise
 from sccal.filter.noise import (
     COARSE_HZ,
     MISFIT,
@@ -28,6 +27,7 @@ from sccal.filter.noise import (
 )
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, find_start
+from sccal.results.noise import Noise
 
 OUTPUT_RATE_HZ = 5.0
 FIX_RATE_HZ = 5.0

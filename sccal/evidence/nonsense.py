@@ -14,7 +14,8 @@ import numpy as np
 
 from sccal.align import Aligned, Series
 from sccal.arrays import Floats
-from sccal.effects.logged import LoggedColumn, Range
+from sccal.effects.logged import LoggedColumn
+from sccal.results.model import Range
 
 COUNT = 8
 STEP_S = 0.5
@@ -39,7 +40,7 @@ def with_nonsense(runs: Sequence[Aligned], seed: int = 0) -> tuple[list[Aligned]
             extras[f"{NAME}_{k}"] = made
             series.setdefault(f"{NAME}_{k}", []).append(made)
         dressed.append(replace(aligned, extras=extras))
-    ranges = {name: Range.of(each) for name, each in series.items()}
+    ranges = {name: Range.of(one.values for one in each) for name, each in series.items()}
     return dressed, tuple(
         NonsenseColumn(where, name, one) for name, one in ranges.items() if one.spread > 0 for where in WHERE
     )

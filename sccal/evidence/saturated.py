@@ -18,9 +18,9 @@ from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted, Model, refitted
 from sccal.evidence.posterior import WIDEST, Posterior
 from sccal.filter.iterate import At
-from sccal.filter.levels import Noise
 from sccal.filter.noise import Reach
 from sccal.filter.start import Constants
+from sccal.results.noise import Noise
 
 
 @dataclass(frozen=True)

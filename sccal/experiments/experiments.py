@@ -13,13 +13,23 @@ from scipy.special import stdtrit
 
 from sccal.align import align
 from sccal.arrays import Floats
-from sccal.calibration.result import Parameters
 from sccal.calibration.single import calibrate_run
 from sccal.errors import SccalError
-from sccal.experiments.plan import EXPERIMENTS, PATHS, TOLERANCE_PERCENT, VARIANTS, Experiment, Variant, robot
-from sccal.experiments.result import Cell, Experiments, Failed, Spread, VariantFigures
-from sccal.experiments.trial import Trial, default_options, measured_truth, simulated_trials, try_run
+from sccal.experiments.plan import EXPERIMENTS, PATHS, TOLERANCE_PERCENT, robot
+from sccal.experiments.trial import default_options, measured_truth, simulated_trials, try_run
 from sccal.logs.run import RunSource, read_run
+from sccal.results.calibration import Parameters
+from sccal.results.experiments import (
+    VARIANTS,
+    Cell,
+    Experiment,
+    Experiments,
+    Failed,
+    Spread,
+    Trial,
+    Variant,
+    VariantFigures,
+)
 from sccal.simulate.settings import PathName
 
 MEASURED_SEEDS = 3

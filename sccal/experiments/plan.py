@@ -7,10 +7,8 @@ magnetometer's offset wanders are chosen here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 from sccal.degrade.faults import Faults
+from sccal.results.experiments import Experiment
 from sccal.simulate.settings import (
     AhrsSettings,
     ClockSettings,
@@ -21,9 +19,6 @@ from sccal.simulate.settings import (
     SimulationSettings,
 )
 
-Variant = Literal["without", "with"]
-VARIANTS: tuple[Variant, ...] = ("without", "with")
-"""The paper's SC EKF, and SC EKF with offset estimation."""
 PATHS: tuple[PathName, ...] = ("rectangle", "circle", "general")
 FIXES_FIRST_S = 40.0
 """So long the noisy experiments begin with good fixes; at most a fifth of the run."""
@@ -33,33 +28,20 @@ LOSS = (0.5, 0.7)
 """Of the run: from where to where its fixes are lost."""
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """One fault."""
+def judged_s(experiment: Experiment, span_s: tuple[float, float]) -> tuple[float, float]:
+    """From when to when the position error counts, on the run's clock: while the fault lasts."""
+    first, last = span_s
+    if experiment.is_loss:
+        return first + LOSS[0] * (last - first), first + LOSS[1] * (last - first)
+    return first + min(FIXES_FIRST_S, 0.2 * (last - first)), last
 
-    key: str
-    title: str
-    sigma_m: float = 0.0
-    quality: int | None = None
 
-    @property
-    def is_loss(self) -> bool:
-        """Whether the fixes are lost, not noised."""
-        return self.sigma_m == 0.0
-
-    def judged_s(self, span_s: tuple[float, float]) -> tuple[float, float]:
-        """From when to when the position error counts, on the run's clock: while the fault lasts."""
-        first, last = span_s
-        if self.is_loss:
-            return first + LOSS[0] * (last - first), first + LOSS[1] * (last - first)
-        return first + min(FIXES_FIRST_S, 0.2 * (last - first)), last
-
-    def faults(self, span_s: tuple[float, float], seed: int) -> Faults:
-        """The fault for a run that lasts from the first to the second time."""
-        begin, end = self.judged_s(span_s)
-        if self.is_loss:
-            return Faults(losses_s=((begin, end),), seed=seed)
-        return Faults(sigma_m=self.sigma_m, quality=self.quality, from_s=begin, seed=seed)
+def faults_of(experiment: Experiment, span_s: tuple[float, float], seed: int) -> Faults:
+    """The fault for a run that lasts from the first to the second time."""
+    begin, end = judged_s(experiment, span_s)
+    if experiment.is_loss:
+        return Faults(losses_s=((begin, end),), seed=seed)
+    return Faults(sigma_m=experiment.sigma_m, quality=experiment.quality, from_s=begin, seed=seed)
 
 
 EXPERIMENTS = (

@@ -12,15 +12,16 @@ import numpy as np
 from sccal.align import Aligned
 from sccal.arrays import Bools, Floats
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import History, Parameters, Trajectory
 from sccal.calibration.single import calibrate_run
 from sccal.degrade.faults import fault_run
 from sccal.experiments.magnetometer import WanderingOffset
-from sccal.experiments.plan import VARIANTS, Experiment, Variant
+from sccal.experiments.plan import faults_of, judged_s
 from sccal.filter.options import FilterOptions
 from sccal.geodesy import TangentPlane
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import FixStream, Reference, Run
+from sccal.results.calibration import Trajectory
+from sccal.results.experiments import VARIANTS, Experiment, Filtered, Trial
 from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.run import SimulatedRun, simulate_run
 from sccal.simulate.settings import SimulationSettings
@@ -39,46 +40,6 @@ class Truth:
     """East and north (n,) in a plane."""
     parameters: tuple[float, float, float, float] | None = None
     """R_r, R_l, L (m) and heading offset (rad); None where nobody knows them."""
-
-
-@dataclass(frozen=True)
-class Filtered:
-    """One variant on one trial."""
-
-    variant: Variant
-    error_m: Floats
-    """(n,) distance of the forward filter's position from the truth, at the truth's times."""
-    rms_m: float
-    """Over the judged times."""
-    end_m: float
-    """At the last of them."""
-    parameters: Parameters
-    path: Trajectory
-    history: History
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One drive under one fault."""
-
-    t_s: Floats
-    """(n,) from the start of the run."""
-    true_east_m: Floats
-    true_north_m: Floats
-    judged: Bools
-    """(n,) while the fault lasts."""
-    fix_t_s: Floats
-    """Of the fixes that the filters had, from the start of the run."""
-    fix_east_m: Floats
-    fix_north_m: Floats
-    filtered: tuple[Filtered, ...]
-    true_parameters: tuple[float, float, float, float] | None
-    offset_wander_rad: Floats | None = None
-    """(n,) what the magnetometer's offset was beyond its mean; None where nobody knows it."""
-
-    def of(self, variant: Variant) -> Filtered:
-        """One variant's part."""
-        return next(one for one in self.filtered if one.variant == variant)
 
 
 def simulated_trials(
@@ -103,9 +64,9 @@ def simulated_trials(
 def try_run(run: Run, experiment: Experiment, truth: Truth, seed: int, options: CalibrationOptions) -> Trial:
     """One run under one fault. Raises DataError where the faulted run cannot be calibrated."""
     span_s = (float(run.wheels.t_s[0]), float(run.wheels.t_s[-1]))
-    degraded, before = fault_run(run, experiment.faults(span_s, seed))
+    degraded, before = fault_run(run, faults_of(experiment, span_s, seed))
     degraded = replace(degraded, reference=Reference(before, _lost(before, degraded.fixes)))
-    first, last = experiment.judged_s(span_s)
+    first, last = judged_s(experiment, span_s)
     judged = (truth.t_s > first) & (truth.t_s <= last)
     filtered, aligned = [], None
     for variant in VARIANTS:

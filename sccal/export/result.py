@@ -14,9 +14,9 @@ from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.geodesy import TangentPlane
 from sccal.results.document import read_document
-from sccal.results.model import MODEL_FILE, MODEL_SCHEMA, read_saved_model
 from sccal.results.numbers import one_line
 from sccal.results.saved import RESULT_FILE, VEHICLE_FILE, Saved, SavedTrajectory, read_saved, read_trajectory
+from sccal.results.saved_model import MODEL_FILE, MODEL_SCHEMA, read_saved_model
 
 CLOCKS_AGREE_S = 60.0
 """Between the path's first time in UTC and the start that calibration.json tells, which has whole seconds and is that

@@ -35,9 +35,9 @@ from sccal.filter.layout import (
     Output,
     Y,
 )
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start
+from sccal.results.noise import Noise
 
 NUMERIC_RANGE = 5.0
 

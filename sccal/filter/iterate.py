@@ -20,9 +20,9 @@ from sccal.errors import DataError
 from sccal.filter.columns import kernel_columns
 from sccal.filter.forward import Filter, ForwardPass, numeric_limits, prior_covariance
 from sccal.filter.layout import BASE_STATES, WITH_OFFSET, Columns
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, find_start, first_constants
+from sccal.results.noise import Noise
 
 MAX_ROUNDS = 6
 CLOSE_SIGMAS = 0.05

@@ -7,12 +7,12 @@ where the log says nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from sccal.arrays import Bools, Floats
+from sccal.results.noise import Noise
 
 FINEST_FIX_M = 0.0005
 """White error of a fix below which no receiver is: a carrier phase is read to about a hundredth of a wave of 0.19 m,
@@ -33,29 +33,6 @@ class Level:
     high: float
     of_slow_heading: bool = False
     """Whether it vanishes with the heading's slow part, which a filter without the offset state does not have."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Levels and correlation times of the measurement errors that the filter uses, and where they come from."""
-
-    heading_white_rad: float
-    heading_coloured_rad: float
-    heading_tau_s: float
-    fix_scale: float
-    """Factor on the stated (or table) sigma of the fixes of the leading quality: their white part in this log."""
-    fix_coloured_m: float
-    fix_tau_s: float
-    slip_m_per_sqrt_m: float
-    """Random travel error of each wheel: standard deviation after one metre, growing with the root of distance."""
-    source: str = "estimated"
-    """estimated or given."""
-    other_fix_scale: Mapping[int, float] = field(default_factory=dict)
-    """The same factor for fixes of another quality (GGA code to factor)."""
-    fix_stated_m: float = float("nan")
-    """Median of the stated (or table) sigma of the leading fixes, which fix_scale multiplies."""
-    apart_nats: float = 0.0
-    """How far the two best ends of the search are apart in log-likelihood: near zero where the search is sure."""
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,10 @@ from sccal.align.accuracy import table_sigma_m
 from sccal.arrays import Bools, Floats
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, Extension, LaidOut, RunProblem, iterate, whole_nll
-from sccal.filter.levels import Levels, Noise
+from sccal.filter.levels import Levels
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, coarse_constants
+from sccal.results.noise import Noise
 
 STRETCH_S = 480.0
 """So much of a run shows seven numbers; more of it costs more and shows little more."""

@@ -11,7 +11,7 @@ from sccal.gates.allowance import Allowance, parse_allowance
 from sccal.gates.baseline import Baseline, judge_drift, read_baseline
 from sccal.gates.expression import Gate, parse_gates, require_effects
 from sccal.gates.judge import judge
-from sccal.gates.result import GateResult
+from sccal.results.gates import GateResult
 from sccal.results.saved import Saved
 
 DEFAULT_DRIFT = "3sigma"

@@ -16,9 +16,9 @@ from typing import Any
 
 from sccal.errors import DataError, UsageError
 from sccal.gates.allowance import Allowance
-from sccal.gates.result import GateResult, Outcome
 from sccal.results.differences import difference, unit_of, why_not_estimated, why_own_log_only
 from sccal.results.document import read_document
+from sccal.results.gates import GateResult, Outcome
 from sccal.results.saved import (
     PARAMETERS,
     SCHEMA,

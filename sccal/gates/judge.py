@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from sccal.errors import UsageError
 from sccal.gates.expression import OPERATORS, Gate
 from sccal.gates.names import Named, UnknownNameError, look_up
-from sccal.gates.result import GateResult, Outcome
 from sccal.results.differences import why_not_estimated
+from sccal.results.gates import GateResult, Outcome
 from sccal.results.saved import Saved, SavedEstimate
 
 NUMBERS_OF_AN_ESTIMATE = ("value", "sigma")

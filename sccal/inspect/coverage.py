@@ -8,10 +8,10 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.inspect.read import LogStreams
-from sccal.inspect.result import Gap, StreamFacts, StreamName
 from sccal.inspect.together import Together
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE
 from sccal.logs.streams import Notice
+from sccal.results.inspection import Gap, StreamFacts, StreamName
 
 GAP_STEPS = 3.0
 GAP_S = 0.5

@@ -11,8 +11,8 @@ import numpy as np
 from sccal.arrays import Bools, Floats
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.place import PlacedFixes, legs
-from sccal.inspect.result import DriveFacts, Series, StandstillFacts
 from sccal.inspect.together import Together, rate
+from sccal.results.inspection import DriveFacts, Series, StandstillFacts
 
 GRID_S = 0.5
 MOST_STEPS = 40_000

@@ -22,10 +22,10 @@ from sccal.effects.effect import Effect
 from sccal.evidence.confounding import SAME, correlation, reduced
 from sccal.evidence.extension import Free, FreeEffects, plain_forms
 from sccal.filter.iterate import RunProblem
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import coarse_constants, find_start
-from sccal.inspect.result import DriveFacts, Excited, Shown
+from sccal.results.inspection import DriveFacts, Excited, Shown
+from sccal.results.noise import Noise
 
 NEVER_GATE = 1e3
 ANYWHERE_M, ANY_YAW_RAD = 100.0, 1.0

@@ -12,10 +12,10 @@ from sccal.filter.start import ODD_SCALE
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.place import PlacedFixes
 from sccal.inspect.read import LogStreams
-from sccal.inspect.result import CourseFacts, DriveFacts, Finding, FixFacts, Gap, StreamFacts, Weight, Witness
 from sccal.inspect.together import Together
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Notice
+from sccal.results.inspection import CourseFacts, DriveFacts, Finding, FixFacts, Gap, StreamFacts, Weight, Witness
 
 COVERED = 0.9
 ODD_COURSE_RAD = np.radians(5.0)

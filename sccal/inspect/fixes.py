@@ -8,8 +8,8 @@ from sccal.align.accuracy import QUALITY_NAMES
 from sccal.arrays import Floats
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.place import PlacedFixes
-from sccal.inspect.result import FixFacts, QualityShare, QualitySpan, Range
 from sccal.logs.streams import FixStream
+from sccal.results.inspection import FixFacts, QualityShare, QualitySpan, Range
 
 STRIP_CELLS = 60
 FINE_CELLS = 480

@@ -12,13 +12,13 @@ from sccal.inspect.excitation import excited_by_pass, excited_by_shape
 from sccal.inspect.findings import findings
 from sccal.inspect.fixes import fix_facts, range_of
 from sccal.inspect.read import LogStreams, read_streams
-from sccal.inspect.result import ColumnFacts, Excited, Inspection
 from sccal.inspect.together import bring_together
 from sccal.inspect.witnesses import course_facts, witnesses
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, NMEA_FILE
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource
 from sccal.logs.streams import Notice
+from sccal.results.inspection import ColumnFacts, Excited, Inspection
 
 BY_PASS = "one pass of the filter's sensitivities at typical noise"
 BY_SHAPE = "rules of thumb about the shape of the drive, because the log cannot be calibrated as it is"

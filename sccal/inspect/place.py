@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sccal.align import Clock
 from sccal.align.accuracy import fix_covariance, usable
 from sccal.align.clocks import fixes_on_host_clock
 from sccal.arrays import Floats, Ints
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import FixStream
+from sccal.results.clock import Clock
 
 LEG_M = 0.5
 LEG_SCATTERS = 8.0

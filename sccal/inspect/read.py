@@ -12,7 +12,6 @@ from sccal.align.signs import slope_through_origin
 from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.inspect.place import legs, placed_fixes
-from sccal.inspect.result import Unread
 from sccal.logs.encoder import encoder_table
 from sccal.logs.folder import RunFolder
 from sccal.logs.names import VEHICLE_FILE
@@ -20,6 +19,7 @@ from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.vehicle import read_vehicle
+from sccal.results.inspection import Unread
 
 FEWEST_LEGS = 5
 STAND_IN_TRACK_M = 1.0

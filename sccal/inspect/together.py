@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sccal.align import Clock
 from sccal.align.aligned import yaw_to_enu
 from sccal.arrays import Bools, Floats
 from sccal.inspect.place import PlacedFixes, placed_fixes
 from sccal.inspect.read import LogStreams
-from sccal.inspect.result import StreamName
+from sccal.results.clock import Clock
+from sccal.results.inspection import StreamName
 
 MIDDLE_S = 0.5
 

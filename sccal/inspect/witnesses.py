@@ -15,9 +15,9 @@ from sccal.arrays import Floats
 from sccal.inspect.coverage import longest_step_s
 from sccal.inspect.drive import fix_window_s
 from sccal.inspect.place import PlacedFixes, legs
-from sccal.inspect.result import CourseFacts, Witness
 from sccal.inspect.together import Together, there
 from sccal.logs.streams import Vehicle
+from sccal.results.inspection import CourseFacts, Witness
 
 TURN_WINDOW_S = 1.0
 LEAST_TURN_RAD = np.radians(30.0)

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from sccal.calibration.result import Calibration, Parameters, VehicleCalibration
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.verdict import Verdict
+from sccal.results.calibration import Calibration, Parameters, VehicleCalibration
 
 Class = Literal["good", "partial", "doubtful", "unusable"]
 _USABLE: tuple[str, ...] = ("estimated",)

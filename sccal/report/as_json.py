@@ -14,7 +14,11 @@ from datetime import UTC, datetime
 from typing import Any
 
 from sccal import __version__
-from sccal.calibration.result import (
+from sccal.logs.streams import Notice
+from sccal.report.rows import parameter_rows
+from sccal.report.summary import missing_in_any
+from sccal.report.verdict import run_verdict, vehicle_verdict
+from sccal.results.calibration import (
     AgainstReference,
     Calibration,
     Clock,
@@ -30,10 +34,6 @@ from sccal.calibration.result import (
     Unseen,
     VehicleCalibration,
 )
-from sccal.logs.streams import Notice
-from sccal.report.rows import parameter_rows
-from sccal.report.summary import missing_in_any
-from sccal.report.verdict import run_verdict, vehicle_verdict
 from sccal.results.saved import SCHEMA, VEHICLE_RUN
 
 Json = dict[str, Any]

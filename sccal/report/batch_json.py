@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sccal import __version__
-from sccal.gates.result import BatchOutcome, GateResult
 from sccal.report.as_json import Json, strict_document
+from sccal.results.gates import BatchOutcome, GateResult
 
 SCHEMA = "sccal.batch/1"
 

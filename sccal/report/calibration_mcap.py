@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from sccal.arrays import Bools, Floats
-from sccal.calibration.result import Calibration, Trajectory
 from sccal.geodesy import TangentPlane
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY
 from sccal.logs.messages.write import Stamped, encoded, nanoseconds_of, write_topics
 from sccal.report.as_json import calibration_json, json_text
+from sccal.results.calibration import Calibration, Trajectory
 
 MAP_FRAME, ROBOT_FRAME = "map", "base_link"
 

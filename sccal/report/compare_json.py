@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sccal import __version__
-from sccal.compare.result import Comparison, Pair, Side
 from sccal.report.as_json import Json, strict_document
+from sccal.results.comparison import Comparison, Pair, Side
 from sccal.results.saved import SavedEstimate
 
 SCHEMA = "sccal.comparison/1"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from sccal.compare.result import Comparison, Figure, FoundEffect, Pair, Side
 from sccal.report.text import in_columns, labelled, wrapped
+from sccal.results.comparison import Comparison, Figure, FoundEffect, Pair, Side
 from sccal.results.differences import unit_of
 from sccal.results.numbers import one_line, plain, short, value_and_sigma
 from sccal.results.saved import SavedEstimate

@@ -15,8 +15,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sccal.arrays import Bools, Floats
-from sccal.calibration.result import OutageWindow
-from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
 from sccal.report.diagnosis_text import something_added
 from sccal.report.figures import (
     BLACK,
@@ -34,6 +32,8 @@ from sccal.report.figures import (
     thinned,
 )
 from sccal.report.text import shortened
+from sccal.results.calibration import OutageWindow
+from sccal.results.diagnosis import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
 from sccal.results.numbers import one_line, plain, short
 
 RANKED_SHOWN = 8

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 from sccal import __version__
-from sccal.diagnose.result import Diagnosis, Finding, RunNoise
 from sccal.effects.catalogue import CATALOGUE
 from sccal.report.diagnosis_figures import drift_drawing, finding_drawings, unexplained_drawing
 from sccal.report.diagnosis_text import (
@@ -28,8 +27,9 @@ from sccal.report.html import page
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.summary import warnings_first
 from sccal.report.text import sentence, shortened
-from sccal.results.model import MODEL_FILE
+from sccal.results.diagnosis import Diagnosis, Finding, RunNoise
 from sccal.results.numbers import one_line, plain, short
+from sccal.results.saved_model import MODEL_FILE
 
 RUNS_LISTED = 6
 

@@ -9,7 +9,6 @@ import math
 from typing import Any
 
 from sccal import __version__
-from sccal.diagnose.result import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
 from sccal.report.as_json import (
     Json,
     estimate_block,
@@ -18,6 +17,7 @@ from sccal.report.as_json import (
     parameter_blocks,
     strict_document,
 )
+from sccal.results.diagnosis import Diagnosis, Finding, Judgement, Picture, Ranked, Unexplained
 
 SCHEMA = "sccal.diagnosis/1"
 

@@ -9,13 +9,13 @@ import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 
-from sccal.calibration.result import Estimate
-from sccal.diagnose.result import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
 from sccal.effects.catalogue import CATALOGUE
 from sccal.effects.words import about, percent, sense, size
 from sccal.report.rows import Row
 from sccal.report.summary import held_out_drift
 from sccal.report.text import in_columns, labelled, notice_lines, shortened, wrapped
+from sccal.results.calibration import Estimate
+from sccal.results.diagnosis import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
 from sccal.results.numbers import MISSING, one_line, plain, short, value_and_sigma
 
 FINDINGS_IN_THE_VERDICT = 2

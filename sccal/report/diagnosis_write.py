@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sccal.diagnose.result import Diagnosis
 from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.diagnosis_json import diagnosis_json
 from sccal.report.model_json import model_json
-from sccal.results.diagnosis import DIAGNOSIS_FILE
-from sccal.results.model import MODEL_FILE
+from sccal.results.diagnosis import Diagnosis
+from sccal.results.saved_diagnosis import DIAGNOSIS_FILE
+from sccal.results.saved_model import MODEL_FILE
 
 
 def write_diagnosis(d: Diagnosis, out: Path) -> None:

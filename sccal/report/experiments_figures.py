@@ -18,9 +18,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from sccal.arrays import Bools, Floats
-from sccal.experiments.plan import TOLERANCE_PERCENT, VARIANTS, Variant
-from sccal.experiments.result import Cell, Experiments
-from sccal.experiments.trial import Trial
+from sccal.experiments.plan import TOLERANCE_PERCENT
 from sccal.report.experiments_text import lines_of
 from sccal.report.figures import (
     BLACK,
@@ -41,6 +39,7 @@ from sccal.report.figures import (
     svg_text,
 )
 from sccal.report.text import sentence, shortened
+from sccal.results.experiments import VARIANTS, Cell, Experiments, Trial, Variant
 from sccal.results.numbers import short
 
 COLOURS: dict[Variant, str] = {"without": VERMILION, "with": BLUE}

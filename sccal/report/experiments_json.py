@@ -10,9 +10,9 @@ from typing import Any
 
 from sccal import __version__
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
-from sccal.experiments.plan import TOLERANCE_PERCENT, VARIANTS
-from sccal.experiments.result import PARAMETERS, Cell, Experiments, Spread, VariantFigures
+from sccal.experiments.plan import TOLERANCE_PERCENT
 from sccal.report.as_json import Json, strict_document, variant_key
+from sccal.results.experiments import PARAMETERS, VARIANTS, Cell, Experiments, Spread, VariantFigures
 
 SCHEMA = "sccal.experiments/1"
 

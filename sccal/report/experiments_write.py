@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sccal.experiments.result import Experiments
 from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.experiments_json import experiments_json
+from sccal.results.experiments import Experiments
 
 
 def write_experiments(e: Experiments, out: Path) -> Path:

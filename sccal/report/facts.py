@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from sccal.calibration.result import Calibration, Fit, HeldOut, Manoeuvre, Outage, Provenance
 from sccal.report.rows import parameter_rows
 from sccal.report.summary import (
     fixes_line,
@@ -18,6 +17,7 @@ from sccal.report.summary import (
     reference_lines,
     unseen_line,
 )
+from sccal.results.calibration import Calibration, Fit, HeldOut, Manoeuvre, Outage, Provenance
 from sccal.results.numbers import MISSING, duration, one_line, plain, short
 
 KINDS = {

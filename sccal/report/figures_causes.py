@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Calibration, Cause
 from sccal.report.figures import BLUE, INK, SOFT, VERMILION, strided
 from sccal.report.panel import Panel, Sheet, limits
 from sccal.report.plan import Plan
+from sccal.results.calibration import Calibration, Cause
 from sccal.results.numbers import plain
 
 RESIDUALS = {"heading": ("heading", "deg"), "along": ("fix along", "m"), "across": ("fix to the left", "m")}

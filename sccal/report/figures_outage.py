@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from sccal.calibration.result import Outage
 from sccal.report.figures import BLUE, POINTS, SOFT, VERMILION, thinned
 from sccal.report.panel import SMALL, Panel, Sheet
 from sccal.report.plan import Plan
+from sccal.results.calibration import Outage
 from sccal.results.numbers import one_line, plain, short
 
 _LEFT, _RIGHT, _BOTTOM, _TOP, _ENDS, _MIDDLE = 40.0, 8.0, 34.0, 40.0, 84.0, 14.0

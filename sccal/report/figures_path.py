@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Calibration, OutageWindow
 from sccal.report.figures import (
     BLUE,
     CLOUD_POINTS,
@@ -20,6 +19,7 @@ from sccal.report.figures import (
 )
 from sccal.report.panel import SIZE, SMALL, Mark, Panel, Sheet, labels, limits, ticks
 from sccal.report.plan import Plan
+from sccal.results.calibration import Calibration, OutageWindow
 from sccal.results.numbers import plain, short
 
 WINDOWS_SHOWN = 400

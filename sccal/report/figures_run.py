@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sccal.calibration.result import Calibration
 from sccal.report.figures import Drawing
 from sccal.report.figures_causes import causes_plan
 from sccal.report.figures_outage import outage_plan
 from sccal.report.figures_path import path_plan
 from sccal.report.figures_series import consistency_plan, parameters_plan, residuals_plan
 from sccal.report.plan import Plan, drawn
+from sccal.results.calibration import Calibration
 
 
 def run_plans(c: Calibration) -> tuple[Plan, ...]:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from sccal.arrays import Bools, Floats
-from sccal.calibration.result import Calibration, Consistency, Estimate
 from sccal.report.figures import (
     BLUE,
     CLOUD_POINTS,
@@ -23,6 +22,7 @@ from sccal.report.figures import (
 from sccal.report.panel import Panel, Sheet
 from sccal.report.plan import Plan
 from sccal.report.rows import parameter_rows
+from sccal.results.calibration import Calibration, Consistency, Estimate
 from sccal.results.numbers import short
 
 SETTLED_FROM = 0.25

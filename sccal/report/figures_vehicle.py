@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from sccal.calibration.result import Estimate, VehicleCalibration
 from sccal.report.figures import BLUE, GREY, PAPER, VERMILION, Drawing, full_tick_labels, styled, svg_text
 from sccal.report.figures_outage import outage_plan
 from sccal.report.plan import drawn
 from sccal.report.rows import parameter_rows
+from sccal.results.calibration import Estimate, VehicleCalibration
 from sccal.results.numbers import one_line
 
 RUNS_SHOWN = 40

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from sccal.gates.result import GateResult
 from sccal.report.text import wrapped
 from sccal.results.differences import unit_of
+from sccal.results.gates import GateResult
 from sccal.results.numbers import MISSING, one_line, short, with_sigma
 from sccal.results.saved import VEHICLE_RUN, SavedEstimate
 

@@ -8,7 +8,6 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from sccal import __version__
-from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.report.advice import advice_on
 from sccal.report.facts import driven_lines, fit_and_outage, fit_facts, origin_lines, shown_lines, started, variant
 from sccal.report.figures_run import run_drawings
@@ -25,6 +24,7 @@ from sccal.report.summary import (
     warnings_first,
 )
 from sccal.report.verdict import Verdict, run_verdict, vehicle_verdict
+from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.numbers import duration, one_line, plain, short
 
 _PAGES = Environment(

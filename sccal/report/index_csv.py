@@ -11,7 +11,7 @@ import io
 import math
 
 from sccal.results.saved import PARAMETERS, SavedEstimate
-from sccal.summary.result import FailedRun, RunLine, Summary
+from sccal.results.summary import FailedRun, RunLine, Summary
 
 FORMULA_MARKS = ("=", "+", "-", "@", "\t", "\r", "\n", "\0", "＝", "＋", "－", "＠")
 _FIRST = ("run", "vehicle", "started", "verdict", "duration_s", "distance_m")

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from sccal.arrays import Floats
 from sccal.report.figures import BLUE, GREY, SKY, VERMILION, full_tick_labels, plain_ticks, styled, svg_text
 from sccal.report.index_lines import Shown, shown
-from sccal.summary.result import Chart, ThinPath
+from sccal.results.summary import Chart, ThinPath
 
 PATH_UNITS = 1000
 """Width and height of the square into which a path is drawn."""

@@ -11,7 +11,6 @@ from urllib.parse import quote
 import numpy as np
 
 from sccal import __version__
-from sccal.gates.result import GateResult
 from sccal.report.html import page
 from sccal.report.index_figures import control_chart, path_strokes
 from sccal.report.index_lines import (
@@ -27,9 +26,10 @@ from sccal.report.index_lines import (
     versions_line,
 )
 from sccal.report.rows import STATUS_WORDS
+from sccal.results.gates import GateResult
 from sccal.results.numbers import duration, one_line, plain
 from sccal.results.saved import PARAMETERS, VEHICLE_RUN, SavedEstimate
-from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
+from sccal.results.summary import Chart, RunLine, Summary, VehicleSummary
 
 MOST_FIGURES = 12
 """Vehicles whose charts are drawn: those that change first, then those with most runs."""

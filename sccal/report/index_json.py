@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from sccal import __version__
-from sccal.gates.result import GateResult
 from sccal.report.as_json import Json, strict_document
 from sccal.report.batch_json import gate_block
 from sccal.report.index_lines import change_sentence
+from sccal.results.gates import GateResult
 from sccal.results.saved import SUMMARY_SCHEMA, SavedEstimate
-from sccal.summary.result import Chart, RunLine, Summary, VehicleSummary
+from sccal.results.summary import Chart, RunLine, Summary, VehicleSummary
 
 
 def summary_json(summary: Summary, gates: Sequence[GateResult] = ()) -> Json:

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from sccal.calibration.result import Estimate
 from sccal.report.rows import effect_rows
+from sccal.results.calibration import Estimate
 from sccal.results.numbers import duration, one_line, plain, value_and_sigma
 from sccal.results.saved import SavedEstimate
-from sccal.summary.result import Chart, RunLine, Summary, Totals, Trend, VehicleSummary
+from sccal.results.summary import Chart, RunLine, Summary, Totals, Trend, VehicleSummary
 
 LEVEL_MARKS = {"good": "✓", "partial": "◐", "doubtful": "▲", "failed": "✕"}
 """A verdict is told by more than its colour."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sccal.gates.result import GateResult
 from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.index_csv import summary_csv
 from sccal.report.index_json import summary_json
+from sccal.results.gates import GateResult
 from sccal.results.saved import SUMMARY_FILE
-from sccal.summary.result import Summary
+from sccal.results.summary import Summary
 
 INDEX_FILE = "index.html"
 TABLE_FILE = "summary.csv"

@@ -16,7 +16,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from sccal.arrays import Floats, Ints
-from sccal.inspect.result import Inspection, StreamFacts
 from sccal.report.figures import (
     BLACK,
     BLUE,
@@ -37,6 +36,7 @@ from sccal.report.figures import (
     svg_text,
     thinned,
 )
+from sccal.results.inspection import Inspection, StreamFacts
 
 STANDSTILLS_SHOWN = 200
 SPANS_SHOWN = 400

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sccal import __version__
-from sccal.inspect.result import Excited, Inspection, Shown, Weight
 from sccal.report.html import page
 from sccal.report.inspect_figures import inspection_drawings
 from sccal.report.inspect_lines import (
@@ -23,6 +22,7 @@ from sccal.report.inspect_lines import (
     witness_line,
 )
 from sccal.report.summary import warnings_first
+from sccal.results.inspection import Excited, Inspection, Shown, Weight
 from sccal.results.numbers import one_line
 
 _TAGS: dict[Shown, str] = {"yes": "good", "weak": "partial", "no": "doubtful"}

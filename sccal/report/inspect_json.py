@@ -11,9 +11,9 @@ from dataclasses import asdict
 from typing import Any
 
 from sccal import __version__
-from sccal.inspect.result import DriveFacts, Excited, FixFacts, Inspection, StandstillFacts, StreamFacts
 from sccal.report.as_json import Json, clock_block, notice_blocks, strict_document
 from sccal.report.inspect_lines import log_verdict
+from sccal.results.inspection import DriveFacts, Excited, FixFacts, Inspection, StandstillFacts, StreamFacts
 
 SCHEMA = "sccal.inspect/1"
 SPANS_TOLD = 500

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sccal.inspect.drive import SECTORS, STANDSTILL_S
-from sccal.inspect.result import (
+from sccal.report.summary import clock_line
+from sccal.results.inspection import (
     ColumnFacts,
     CourseFacts,
     DriveFacts,
@@ -21,7 +22,6 @@ from sccal.inspect.result import (
     StreamName,
     Witness,
 )
-from sccal.report.summary import clock_line
 from sccal.results.numbers import MISSING, duration, one_line, plain, short
 
 COLUMNS_TOLD = 12

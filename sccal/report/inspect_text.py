@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from sccal.align.accuracy import QUALITY_NAMES
-from sccal.inspect.result import FixFacts, Inspection, Shown
 from sccal.report.inspect_lines import (
     STREAM_HEADER,
     clock_text,
@@ -22,6 +21,7 @@ from sccal.report.inspect_lines import (
 )
 from sccal.report.summary import notice_text
 from sccal.report.text import in_columns, labelled, wrapped
+from sccal.results.inspection import FixFacts, Inspection, Shown
 from sccal.results.numbers import one_line
 
 NOTICES_SHOWN = 6

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sccal.inspect.result import Inspection
 from sccal.logs.write import write_text
 from sccal.report.as_json import json_text
 from sccal.report.inspect_json import inspections_json
+from sccal.results.inspection import Inspection
 
 
 def write_inspection(i: Inspection, folder: Path) -> Path:

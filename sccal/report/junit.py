@@ -13,9 +13,9 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from sccal.errors import Failure, one_line
-from sccal.gates.result import BatchOutcome, GateResult
 from sccal.report.gates_text import estimate_text, gate_line
 from sccal.results.differences import why_not_estimated
+from sccal.results.gates import BatchOutcome, GateResult
 from sccal.results.saved import Saved, SavedEstimate
 
 SUITES = "sccal calibrate"

@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any, NoReturn, cast, get_args
 
 from sccal import __version__
-from sccal.calibration.result import Estimate, Noise, Parameters, Status
-from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.effects.catalogue import CATALOGUE
-from sccal.effects.logged import Range
 from sccal.errors import DataError, UsageError
 from sccal.report.as_json import Json, estimate_block, json_text, noise_block, parameter_blocks, strict_document
-from sccal.results.model import MODEL_SCHEMA
+from sccal.results.calibration import Estimate, Noise, Parameters, Status
+from sccal.results.model import JudgedEffect, JudgedModel, Range
+from sccal.results.saved_model import MODEL_SCHEMA
 
 _LEVELS = {
     "heading_white_deg": "heading_white_rad",
@@ -34,7 +33,7 @@ _LEVELS = {
 """Levels of the noise by their names in the file."""
 
 
-def model_json(m: SavedModel) -> Json:
+def model_json(m: JudgedModel) -> Json:
     """A model as a document."""
     return strict_document(
         {
@@ -49,13 +48,13 @@ def model_json(m: SavedModel) -> Json:
     )
 
 
-def digest_of(m: SavedModel) -> str:
+def digest_of(m: JudgedModel) -> str:
     """SHA-256 of a model's content in hex: the same model, the same effects and noise."""
     document = {name: block for name, block in model_json(m).items() if name != "sccal_version"}
     return hashlib.sha256(json_text(document).encode()).hexdigest()
 
 
-def read_model(path: Path) -> SavedModel:
+def read_model(path: Path) -> JudgedModel:
     """A model from its file.
 
     Raises:
@@ -71,7 +70,7 @@ def read_model(path: Path) -> SavedModel:
     return model_from(document, path)
 
 
-def model_from(document: object, path: Path) -> SavedModel:
+def model_from(document: object, path: Path) -> JudgedModel:
     """A model from its document; ``path`` is for messages. Raises DataError where a part is missing or wrong."""
     whole = _Block(document, path, "")
     schema = whole.get("schema")
@@ -85,7 +84,7 @@ def model_from(document: object, path: Path) -> SavedModel:
     noises: dict[str, Noise] = {}
     for one in whole.blocks("noise"):
         noises[one.text("run")] = _noise_from(one)
-    return SavedModel(
+    return JudgedModel(
         vehicle=whole.text("vehicle"),
         parameters=Parameters(right, left, track, _in_radians(offset_deg)),
         effects=tuple(_effect_from(one) for one in whole.blocks("effects")),
@@ -95,7 +94,7 @@ def model_from(document: object, path: Path) -> SavedModel:
     )
 
 
-def _effect(one: SavedEffect) -> Json:
+def _effect(one: JudgedEffect) -> Json:
     return {
         "effect": one.name,
         "title": one.title,
@@ -111,7 +110,7 @@ def _effect(one: SavedEffect) -> Json:
     }
 
 
-def _effect_from(block: _Block) -> SavedEffect:
+def _effect_from(block: _Block) -> JudgedEffect:
     name, run = block.text("effect"), block.get("run")
     if run is not None and not isinstance(run, str):
         block.wrong("run", "must be the name of a run, or null")
@@ -120,7 +119,7 @@ def _effect_from(block: _Block) -> SavedEffect:
         block.wrong("told", "must be true or false")
     parameters, shapes = block.block("parameters"), block.block("shapes")
     known = [*parameters.each(), *shapes.each()]
-    effect = SavedEffect(
+    effect = JudgedEffect(
         name=name,
         title=block.text("title"),
         parameters={key: _estimate_from(one) for key, one in parameters.each().items()},

@@ -18,7 +18,6 @@ from matplotlib.textpath import text_to_path
 
 from sccal import __version__
 from sccal.arrays import Floats
-from sccal.calibration.result import Calibration
 from sccal.report.advice import advice_on
 from sccal.report.facts import driven_lines, fit_facts, origin_lines, shown_lines, started, variant
 from sccal.report.figures import FACE, GREEN, GRID, INK, ORANGE, SOFT, VERMILION, styled
@@ -28,6 +27,7 @@ from sccal.report.plan import Plan
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import clock_line, drive_line, noise_facts, notice_text, warnings_first
 from sccal.report.verdict import run_verdict
+from sccal.results.calibration import Calibration
 from sccal.results.numbers import one_line
 
 A4 = (595.28, 841.89)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.export.result import Result
 from sccal.export.ros2_control import write_ros2_control
 from sccal.report.as_json import calibration_json, vehicle_json
+from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.saved import RESULT_FILE, VEHICLE_FILE, Saved
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from sccal.calibration.result import Estimate, Parameters, Status
+from sccal.results.calibration import Estimate, Parameters, Status
 from sccal.results.numbers import MISSING, change_percent, one_line, short, value_and_sigma, with_sigma, wrapped_deg
 
 STATUS_WORDS: Mapping[Status, str] = {

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from sccal.errors import UsageError
-from sccal.gates.result import BatchOutcome, Outcome
 from sccal.report.gates_text import gate_line, gates_count, whose
+from sccal.results.gates import BatchOutcome, Outcome
 from sccal.results.numbers import MISSING, one_line, plain, value_and_sigma
 from sccal.results.saved import Saved, SavedEstimate
 

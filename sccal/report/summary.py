@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from sccal.calibration.result import (
+from sccal.logs.streams import Notice
+from sccal.results.calibration import (
     AgainstReference,
     Clock,
     Drive,
@@ -17,7 +18,6 @@ from sccal.calibration.result import (
     OutageWindow,
     Unseen,
 )
-from sccal.logs.streams import Notice
 from sccal.results.numbers import MISSING, duration, one_line, plain, short, value_and_sigma
 
 LOSSES_SHOWN = 5

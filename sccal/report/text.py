@@ -6,7 +6,6 @@ import re
 import textwrap
 from collections.abc import Iterable, Sequence
 
-from sccal.calibration.result import Calibration, Estimate, Noise, Parameters, Status, VehicleCalibration
 from sccal.logs.streams import Notice
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
@@ -27,6 +26,7 @@ from sccal.report.summary import (
     unseen_line,
 )
 from sccal.report.verdict import run_verdict, vehicle_verdict
+from sccal.results.calibration import Calibration, Estimate, Noise, Parameters, Status, VehicleCalibration
 from sccal.results.numbers import duration, one_line, plain, short, value_and_sigma
 
 NOTICES_SHOWN = 5

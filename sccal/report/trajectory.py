@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.calibration.result import Trajectory
 from sccal.export.tum import tum_rows
+from sccal.results.calibration import Trajectory
 
 CSV_HEADER = "t,east_m,north_m,yaw_rad,sigma_east_m,sigma_north_m,sigma_yaw_rad\n"
 

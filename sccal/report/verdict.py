@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from sccal.calibration.result import Calibration, Estimate, Fit, Missing, Noise, Parameters, VehicleCalibration
 from sccal.calibration.status import fixes_wander, heading_wanders
 from sccal.report.rows import parameter_rows
 from sccal.report.summary import missing_in_any
+from sccal.results.calibration import Calibration, Estimate, Fit, Missing, Noise, Parameters, VehicleCalibration
 from sccal.results.numbers import short
 
 NIS_LOW = 0.3

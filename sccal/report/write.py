@@ -6,12 +6,12 @@ import importlib
 import threading
 from pathlib import Path
 
-from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.logs.write import write_bytes, write_text
 from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.calibration_mcap import write_calibration_mcap
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
+from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.saved import RESULT_FILE, TRAJECTORY_FILE
 
 MCAP_FILE = "calibration.mcap"

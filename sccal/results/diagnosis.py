@@ -1,90 +1,186 @@
-"""diagnosis.json read again (schema ``sccal.diagnosis/1``)."""
+"""What a diagnosis found, with everything that a report needs: reports compute nothing.
+
+Angles are in radians here, but for effects' parameters, which are in the files' units.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
 
-from sccal.errors import DataError
-from sccal.results.document import read_document
-from sccal.results.saved import PARAMETERS, Json, SavedEstimate, read_estimate
-
-DIAGNOSIS_SCHEMA = "sccal.diagnosis/1"
-DIAGNOSIS_FILE = "diagnosis.json"
+from sccal.arrays import Floats
+from sccal.logs.streams import Notice, Vehicle
+from sccal.results.calibration import Estimate, Noise, OutageWindow, Parameters
+from sccal.results.model import JudgedModel
 
 
 @dataclass(frozen=True)
-class SavedFinding:
-    """One effect that the data hold and the model does not."""
+class Picture:
+    """A residual against what it follows, before and after; all arrays are short enough to draw every point."""
 
-    effect: str
-    parameters: Mapping[str, SavedEstimate]
-    evidence_nats: float | None
-    """None where the file is of a version that did not tell it."""
-    held_out_gain_nats: float | None
-    t: float | None
+    x_label: str
+    """With unit: "turn rate, deg/s"."""
+    y_label: str
+    """With unit: "heading residual, deg"."""
+    x: Floats
+    """(k,) bin centres, or single points where there is no repetition."""
+    before: Floats
+    """(k,) mean residual without the effect."""
+    before_sigma: Floats
+    """(k,) standard error of that mean."""
+    after: Floats
+    """(k,) mean residual with the effect in the model."""
+    after_sigma: Floats
+    model: Floats
+    """(k,) what the effect adds there, as fitted."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate as it stood when a finding was made."""
+
+    name: str
+    title: str
+    named: bool
+    """False for a pattern without a name."""
+    evidence_nats: float
+    t: float
+    size: float
+    """Largest parameter in units of the smallest size that matters."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect that was added to the model, in the order in which it was."""
+
+    name: str
+    title: str
+    reference: str
+    parameters: Mapping[str, Estimate]
+    units: Mapping[str, str]
+    """Of each parameter, "1" for ratios."""
+    evidence_nats: float
+    """What it brings beside the others, the price of its own freedom paid (a logarithm of odds)."""
+    held_out_gain_nats: float
+    t: float
     indistinguishable_from: tuple[str, ...]
+    """Other effects that explain the same on this drive."""
+    advice: str
+    """What to drive to tell them apart; empty where nothing else explains it."""
+    ranking: tuple[Ranked, ...]
+    """The best candidates at that moment, best first; the chosen one among them."""
+    drift_before_m: float | None
+    """End of the outage windows, rms, held out, before and after this step."""
+    drift_after_m: float | None
+    picture: Picture | None
+    per_run: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    """Of each parameter that every run has its own of, in the order of the runs; ``parameters`` has their mean."""
+    aligned: bool = False
+    """Whether all of it was found, and put right, when the streams were brought onto one clock, before any fit."""
 
 
 @dataclass(frozen=True)
-class SavedDiagnosis:
-    """One diagnosis as its file tells it."""
+class NotExcited:
+    """An effect that this drive could not have shown."""
 
-    path: Path
-    document: Json
-
-    @property
-    def vehicle(self) -> str:
-        """Empty where the file does not tell."""
-        return str(self.document.get("vehicle", ""))
-
-    @property
-    def runs(self) -> tuple[str, ...]:
-        return tuple(str(run) for run in self.document["runs"])
-
-    @property
-    def findings(self) -> Mapping[str, SavedFinding]:
-        """By effect, in the order in which they were added."""
-        return {
-            str(one["effect"]): SavedFinding(
-                str(one["effect"]),
-                {name: read_estimate({"status": "estimated", **block}) for name, block in one["parameters"].items()},
-                one["evidence"].get("evidence_nats"),
-                one["evidence"].get("held_out_gain_nats"),
-                one["evidence"].get("t"),
-                tuple(str(name) for name in one.get("indistinguishable_from", ())),
-            )
-            for one in self.document["findings"]
-        }
-
-    @property
-    def parameters_after(self) -> Mapping[str, SavedEstimate]:
-        """The model's parameters with the findings in it; those of PARAMETERS that the file tells."""
-        blocks = self.document.get("parameters_after") or {}
-        return {key: read_estimate(blocks[key]) for key in PARAMETERS if key in blocks}
-
-    def judged(self, when: str) -> Mapping[str, float | None]:
-        """The figures on held-out data, ``when`` = ``before`` or ``after`` the findings; single numbers only."""
-        return {
-            name: None if value is None else float(value)
-            for name, value in self.document[when].items()
-            if value is None or isinstance(value, int | float)
-        }
+    name: str
+    title: str
+    advice: str
 
 
-def read_diagnosis(path: Path) -> SavedDiagnosis:
-    """A diagnosis from its JSON file.
+@dataclass(frozen=True)
+class Detectable:
+    """The smallest size of an effect that this drive would have shown."""
 
-    Raises:
-        DataError: the file is no diagnosis of the schema.
-    """
-    document, schema = read_document(path)
-    if schema != DIAGNOSIS_SCHEMA:
-        raise DataError(f"{path}: its schema is {schema!r}, not {DIAGNOSIS_SCHEMA}")
-    saved = SavedDiagnosis(path, document)
-    try:
-        _ = saved.runs, saved.findings, saved.parameters_after, saved.judged("before"), saved.judged("after")
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise DataError(f"{path}: not all of a diagnosis is there ({error!r}); diagnose again") from error
-    return saved
+    name: str
+    title: str
+    smallest: Mapping[str, float]
+    """By parameter, in the files' units."""
+    units: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Inseparable:
+    """Effects that this drive cannot tell apart, whichever of them is there."""
+
+    names: tuple[str, ...]
+    advice: str
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One model on data that did not fit it."""
+
+    windows: tuple[OutageWindow, ...]
+    window_s: float
+    outage_rms_m: float | None
+    outage_end_rms_m: float | None
+    outage_end_interval_m: tuple[float, float] | None
+    """Where the end drift lies with 90 % (bootstrap over windows)."""
+    gnss_innovation_rms_m: float
+    heading_innovation_rms_rad: float
+    nll_per_measurement: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left and has no name."""
+
+    significant: bool
+    port: str = ""
+    """heading, along, turn, side, antenna_forward, antenna_left, east or north; empty where nothing is significant."""
+    depends_on: str = ""
+    variance_fraction: float = 0.0
+    """Share of the error variance at that port that the pattern holds."""
+    evidence_nats: float = 0.0
+    t: float = 0.0
+    size: str = ""
+    """In words: "up to 2.1 deg"."""
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True)
+class Placebo:
+    """The same test on nonsense columns: this log's own false alarms."""
+
+    tried: int
+    passed: int
+    highest_nats: float
+    """Most evidence that a nonsense column brought."""
+    needed_nats: float
+    """What a finding needs, at least."""
+
+
+@dataclass(frozen=True)
+class RunNoise:
+    """The noise of one run with the findings in the model."""
+
+    run: str
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole story of some runs of one vehicle."""
+
+    runs: tuple[str, ...]
+    vehicle: Vehicle
+    trust: str
+    """How the measurements were trusted, in a sentence."""
+    findings: tuple[Finding, ...]
+    taken_back: Mapping[str, str]
+    """Candidates that passed the test and were taken back, and why."""
+    not_excited: tuple[NotExcited, ...]
+    detectable: tuple[Detectable, ...]
+    inseparable: tuple[Inseparable, ...]
+    before: Judgement
+    after: Judgement
+    held_out_how: str
+    unexplained: Unexplained
+    placebo: Placebo
+    parameters_before: Parameters
+    parameters_after: Parameters
+    noises: tuple[RunNoise, ...]
+    notices: tuple[Notice, ...]
+    model: JudgedModel
+    """The model of ``after``, for other commands to start from."""

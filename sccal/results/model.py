@@ -1,53 +1,63 @@
-"""model.json (schema ``sccal.model/1``) as a result among others: constants and effects that a diagnosis judged."""
+"""A model as a diagnosis judged it, to start from again: effects in their shapes, constants, and noise by run."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
-from sccal.errors import DataError
-from sccal.results.document import read_document
-from sccal.results.numbers import plain
-from sccal.results.saved import VEHICLE_RUN, Saved
+import numpy as np
 
-MODEL_SCHEMA = "sccal.model/1"
-MODEL_FILE = "model.json"
+from sccal.arrays import Floats
+from sccal.results.calibration import Estimate, Parameters
+from sccal.results.noise import Noise
 
-
-def read_saved_model(path: Path) -> Saved:
-    """A model in the form of a vehicle's result: constants, effects, and in place of a verdict how it was judged.
-
-    Raises:
-        DataError: the file is no model of the schema.
-    """
-    document, schema = read_document(path)
-    if schema != MODEL_SCHEMA:
-        raise DataError(f"{path}: its schema is {schema!r}, not {MODEL_SCHEMA}")
-    try:
-        saved = Saved(
-            path,
-            {
-                "schema": MODEL_SCHEMA,
-                "run": VEHICLE_RUN,
-                "vehicle": str(document["vehicle"]),
-                "verdict": _judged(document["held_out"]),
-                "parameters": document["parameters"],
-                "effects": {_name(one): one["parameters"] for one in document["effects"]},
-                "runs": [{"run": str(one["run"])} for one in document["noise"]],
-            },
-        )
-        _ = saved.parameters, saved.effects
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise DataError(f"{path}: not all of a model is there ({error!r}); diagnose again") from error
-    return saved
+FAR_FROM_ZERO = 3.0
 
 
-def _name(effect: Any) -> str:
-    """An effect of one run alone is not the vehicle's, and goes by the run's name too."""
-    return f"{effect['effect']}" if effect["run"] is None else f"{effect['effect']} of run {effect['run']}"
+@dataclass(frozen=True)
+class Range:
+    """Where a column's values lie, over all runs."""
+
+    reference: float
+    spread: float
+
+    @classmethod
+    def of(cls, values: Iterable[Floats]) -> Range:
+        """Of all runs' values together, each (n,)."""
+        joined = np.concatenate(list(values))
+        mean, spread = float(joined.mean()), float(joined.std())
+        return cls(mean if abs(mean) > FAR_FROM_ZERO * spread else 0.0, spread)
 
 
-def _judged(held_out: Any) -> str:
-    drift = held_out["outage_end_rms_m"]
-    what = "model of a diagnosis"
-    return what if drift is None else f"{what}: drift without fixes, held out, {plain(float(drift), 2)} m rms"
+@dataclass(frozen=True)
+class JudgedEffect:
+    """One effect of the model."""
+
+    name: str
+    title: str
+    parameters: Mapping[str, Estimate]
+    """In the files' units; of a run's parameter the mean over the runs."""
+    units: Mapping[str, str]
+    shapes: Mapping[str, float] = field(default_factory=dict)
+    """Places, moments and time constants, as they were found."""
+    run: str = ""
+    """The run that it belongs to alone; empty for an effect of all runs."""
+    told: bool = True
+    """False for an effect too small to matter or too unsure to be told, which the model holds because it helps."""
+    prior_scale: float = 1.0
+    column: Range | None = None
+    """Of an effect that follows a logged column: where its values lie over all runs, which its numbers refer to."""
+
+
+@dataclass(frozen=True)
+class JudgedModel:
+    """What model.json holds."""
+
+    vehicle: str
+    parameters: Parameters
+    effects: tuple[JudgedEffect, ...]
+    noises: Mapping[str, Noise]
+    """By run."""
+    outage_end_rms_m: float | None
+    """Drift of the model on data that fitted neither, and how it was judged."""
+    how: str

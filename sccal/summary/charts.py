@@ -22,7 +22,7 @@ import numpy as np
 from sccal.arrays import Bools, Floats
 from sccal.logs.names import natural_key
 from sccal.results.saved import PARAMETERS, Saved, SavedEstimate
-from sccal.summary.result import Chart, NoChart
+from sccal.results.summary import Chart, NoChart
 from sccal.summary.trends import MEDIAN_OF_A_NORMAL, best_trend, on_all_runs
 
 FEWEST_RUNS = 4

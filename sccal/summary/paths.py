@@ -10,7 +10,7 @@ import numpy as np
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.results.saved import Saved, read_trajectory
-from sccal.summary.result import ThinPath
+from sccal.results.summary import ThinPath
 
 ROWS_READ = 600
 """Of a trajectory; more would not show in a picture of this size."""

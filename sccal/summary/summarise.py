@@ -11,9 +11,9 @@ from typing import Any
 from sccal.errors import Failure
 from sccal.logs.names import natural_key
 from sccal.results.saved import Saved
+from sccal.results.summary import Chart, FailedRun, NoChart, Outage, RunLine, Summary, Totals, VehicleSummary
 from sccal.summary.charts import DatedRun, charts_of, dated
 from sccal.summary.paths import thin_path
-from sccal.summary.result import Chart, FailedRun, NoChart, Outage, RunLine, Summary, Totals, VehicleSummary
 from sccal.summary.trends import significant
 
 MOST_CORNERS = 160

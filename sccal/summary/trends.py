@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from sccal.arrays import Bools, Floats
-from sccal.summary.result import Shape, Trend
+from sccal.results.summary import Shape, Trend
 
 ALARM = 0.01
 FEWEST_RUNS = 5

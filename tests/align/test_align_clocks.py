@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import gamma
 
-from sccal.align import Clock
 from sccal.align.clocks import fixes_on_host_clock, require_overlap
 from sccal.errors import DataError
 from sccal.logs.streams import FixStream, Notice
+from sccal.results.clock import Clock
 
 START_UTC_S = 1717243200.0
 MEAN_DELAY_S = 0.02

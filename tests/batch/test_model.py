@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from sccal.calibration.result import Estimate
-from sccal.calibration.saved_model import SavedEffect
 from sccal.effects.catalogue import CATALOGUE, parse_effect
 from sccal.report.as_json import json_text
 from sccal.report.model_json import model_json, read_model
+from sccal.results.calibration import Estimate
+from sccal.results.model import JudgedEffect
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.run import simulate_run
@@ -116,7 +116,7 @@ def test_effects_beside_the_model_are_added(one):
 def with_effect(model: Path, folder: Path, run: str) -> Path:
     """The same model with a jump of the heading in one run alone."""
     step = CATALOGUE["heading_step"]
-    effect = SavedEffect(
+    effect = JudgedEffect(
         "heading_step",
         step.title,
         {"deg": Estimate(0.0, 1.0, "estimated")},

@@ -10,9 +10,9 @@ import pytest
 from sccal.batch.record import FileMark, RunRecord, key_of, light, record_from, record_text
 from sccal.calibration.combine import combine, combined
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import InputFile, Provenance
 from sccal.calibration.shared import SharedLikelihood, far_off, own_answer, pooled
 from sccal.calibration.single import calibrate_run
+from sccal.results.calibration import InputFile, Provenance
 from tests.calibration.test_single import GIVEN
 from tests.runs import read, written
 

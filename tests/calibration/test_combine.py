@@ -9,8 +9,8 @@ import pytest
 
 from sccal.calibration.combine import combine
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Estimate
 from sccal.calibration.single import calibrate_run
+from sccal.results.calibration import Estimate
 from tests.calibration.test_single import GIVEN, NAMES, estimates, truth
 from tests.runs import read, written
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Calibration
 from sccal.calibration.single import calibrate_run
 from sccal.degrade.faults import Faults, fault_run
 from sccal.errors import UsageError
 from sccal.logs.streams import Reference, Run
+from sccal.results.calibration import Calibration
 from tests.runs import read, written
 
 WINDOW_S = (90.0, 130.0)

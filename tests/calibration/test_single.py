@@ -10,9 +10,9 @@ import pytest
 
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.single import calibrate_run
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
+from sccal.results.noise import Noise
 from tests.runs import read, written
 
 NAMES = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_rad")

@@ -7,7 +7,7 @@ import pytest
 from sccal.compare.diagnoses import compare_diagnoses
 from sccal.report.compare_json import compare_json
 from sccal.report.compare_text import compare_text, headline
-from sccal.results.diagnosis import SavedDiagnosis
+from sccal.results.saved_diagnosis import SavedDiagnosis
 
 _JUDGED = {
     "outage_rms_m": 0.9,

@@ -13,7 +13,6 @@ from sccal.align import Aligned, align
 from sccal.arrays import Floats
 from sccal.calibration.options import CalibrationOptions
 from sccal.diagnose.diagnose import diagnose
-from sccal.diagnose.result import Diagnosis
 from sccal.diagnose.shapes import best_forms
 from sccal.effects.catalogue import parse_effect
 from sccal.effects.effect import Effect
@@ -22,6 +21,7 @@ from sccal.evidence.extension import Free
 from sccal.evidence.model import Accepted
 from sccal.evidence.posterior import PRICE_NATS
 from sccal.evidence.saturated import Saturated, saturate
+from sccal.results.diagnosis import Diagnosis
 from sccal.simulate.choose import settings_from
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State

@@ -9,10 +9,10 @@ import pytest
 
 from sccal.diagnose.criteria import LEAST_NATS, LEAST_T
 from sccal.diagnose.diagnose import _aliases, diagnose
-from sccal.diagnose.result import Diagnosis
 from sccal.effects.catalogue import CATALOGUE, parse_effect
 from sccal.evidence.nonsense import COUNT, NAME, WHERE
 from sccal.evidence.posterior import Posterior
+from sccal.results.diagnosis import Diagnosis
 from tests.diagnose.logs import (
     HARMONIC_DEG,
     OPTIONS,

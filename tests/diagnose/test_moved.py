@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from sccal.align.aligned import Moved
-from sccal.calibration.result import Estimate
 from sccal.diagnose.moved import with_moved
+from sccal.results.calibration import Estimate
 from tests.evidence.logs import aligned
 
 

@@ -17,11 +17,11 @@ from sccal.filter import kernel, layout
 from sccal.filter.columns import Placed, kernel_columns
 from sccal.filter.forward import Filter
 from sccal.filter.layout import BASE_STATES
-from sccal.filter.levels import Noise
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
 from sccal.geodesy import TangentPlane
 from sccal.logs.streams import Vehicle
+from sccal.results.noise import Noise
 from sccal.simulate.choose import settings_from
 from sccal.simulate.run import SimulatedRun, simulate_run
 

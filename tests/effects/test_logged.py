@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from sccal.align import Series
-from sccal.effects.logged import LoggedColumn, Range, logged_effects
+from sccal.effects.logged import LoggedColumn, logged_effects
 from sccal.errors import DataError, SccalError, UsageError
 from sccal.evidence.extension import FreeEffects
+from sccal.results.model import Range
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import WheelPair
 from tests.effects.harness import injected
@@ -137,14 +138,14 @@ def test_the_reference_is_taken_off(where, monkeypatch):
 )
 def test_columns_count_from_zero_unless_they_are_far_from_it(mean, spread, reference):
     wave = np.sin(np.linspace(0.0, 40.0 * np.pi, 4001)[:-1]) * np.sqrt(2.0) * spread
-    found = Range.of([Series(np.arange(4000.0), mean + wave)])
+    found = Range.of([mean + wave])
     assert found.reference == pytest.approx(reference, abs=1e-6)
     assert found.spread == pytest.approx(spread, rel=1e-3)
 
 
 def test_the_reference_is_of_all_runs_together():
     cold, warm = (Series(np.arange(100.0), value + np.sin(np.arange(100.0))) for value in (280.0, 320.0))
-    found = Range.of([cold, warm])
+    found = Range.of([cold.values, warm.values])
     assert found.reference == pytest.approx(300.0, abs=0.1)
     assert found.spread == pytest.approx(20.0, rel=0.01)
     alone, both = (

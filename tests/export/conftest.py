@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Calibration
 from sccal.calibration.single import calibrate_run
 from sccal.export.result import Result, read_result
 from sccal.report.write import write_numbers
+from sccal.results.calibration import Calibration
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
 from sccal.simulate.run import SimulatedRun, simulate_run

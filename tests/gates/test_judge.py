@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sccal.errors import DataError, Exit, Failure, SccalError, UsageError
 from sccal.gates.expression import parse_gates
 from sccal.gates.judge import judge
-from sccal.gates.result import BatchOutcome
+from sccal.results.gates import BatchOutcome
 from tests.results.documents import calibration, estimate, saved, vehicle
 
 SIGNS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "!=": operator.ne}

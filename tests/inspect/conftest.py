@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sccal.inspect.result import Inspection
+from sccal.results.inspection import Inspection
 from tests.inspect.logs import copied, inspected
 from tests.runs import written
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from sccal.inspect.inspect import inspect_run
-from sccal.inspect.result import Finding, Inspection, StreamFacts, Witness
 from sccal.logs.run import discover
+from sccal.results.inspection import Finding, Inspection, StreamFacts, Witness
 
 
 def inspected(folder: Path) -> Inspection:

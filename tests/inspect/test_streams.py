@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sccal.align import Clock
 from sccal.errors import DataError
 from sccal.inspect.fixes import STRIP_CELLS, fix_facts
 from sccal.inspect.place import PlacedFixes, legs
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import FixStream
+from sccal.results.clock import Clock
 from tests.inspect.logs import inspected, rows, said, stream
 
 FILES = {"wheels": "encoder.csv", "heading": "ahrs.csv", "fixes": "gnss.nmea"}

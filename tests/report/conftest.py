@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sccal.calibration.result import (
+from sccal.logs.streams import Notice, Vehicle
+from sccal.results.calibration import (
     Calibration,
     Cause,
     Clock,
@@ -30,7 +31,6 @@ from sccal.calibration.result import (
     Trajectory,
     VehicleCalibration,
 )
-from sccal.logs.streams import Notice, Vehicle
 
 VEHICLE = Vehicle("tracked-demo", Path("logs/vehicle.toml"), 0.08, 0.70, ticks_per_rev=32768)
 START_S = 1717243201.0

@@ -14,10 +14,10 @@ from mcap_ros2.decoder import DecoderFactory
 
 from sccal.batch import AlsoWritten, calibrate_paths
 from sccal.calibration.options import CalibrationOptions
-from sccal.calibration.result import Calibration
 from sccal.calibration.single import calibrate_run
 from sccal.geodesy import TangentPlane
 from sccal.logs.run import discover
+from sccal.results.calibration import Calibration
 from tests.runs import read, written
 
 Messages = dict[str, list[tuple[int, Any]]]

@@ -16,12 +16,12 @@ from sccal.gates.allowance import parse_allowance
 from sccal.gates.baseline import Baseline, Earlier, judge_drift
 from sccal.gates.expression import parse_gates
 from sccal.gates.judge import judge
-from sccal.gates.result import BatchOutcome, GateResult
 from sccal.report.as_json import json_text
 from sccal.report.batch_json import batch_json
 from sccal.report.gates_text import gates_text
 from sccal.report.junit import junit_xml
 from sccal.report.step_summary import MOST_BYTES, append_step_summary, cut, escaped, step_summary
+from sccal.results.gates import BatchOutcome, GateResult
 from tests.results.documents import calibration, estimate, saved, vehicle
 
 XSD = xmlschema.XMLSchema(str(Path(__file__).with_name("junit.xsd")))

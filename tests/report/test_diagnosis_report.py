@@ -14,9 +14,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sccal.calibration.result import Estimate, Noise, OutageWindow, Parameters
-from sccal.calibration.saved_model import SavedEffect, SavedModel
-from sccal.diagnose.result import (
+from sccal.effects.catalogue import CATALOGUE
+from sccal.logs.streams import Notice, Vehicle
+from sccal.report.as_json import json_text
+from sccal.report.diagnosis_figures import candidates, drift_before_after, finding_drawings, residual_picture
+from sccal.report.diagnosis_html import diagnosis_html
+from sccal.report.diagnosis_json import diagnosis_json
+from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
+from sccal.report.diagnosis_write import write_diagnosis
+from sccal.results.calibration import Estimate, Noise, OutageWindow, Parameters
+from sccal.results.diagnosis import (
     Detectable,
     Diagnosis,
     Finding,
@@ -29,14 +36,7 @@ from sccal.diagnose.result import (
     RunNoise,
     Unexplained,
 )
-from sccal.effects.catalogue import CATALOGUE
-from sccal.logs.streams import Notice, Vehicle
-from sccal.report.as_json import json_text
-from sccal.report.diagnosis_figures import candidates, drift_before_after, finding_drawings, residual_picture
-from sccal.report.diagnosis_html import diagnosis_html
-from sccal.report.diagnosis_json import diagnosis_json
-from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
-from sccal.report.diagnosis_write import write_diagnosis
+from sccal.results.model import JudgedEffect, JudgedModel
 from tests.report.pages import assert_page
 
 NAN = float("nan")
@@ -158,7 +158,7 @@ def diagnosis(*findings: Finding) -> Diagnosis:
     )
     noise = Noise(math.radians(0.42), math.radians(0.8), 17.3, 1.12, 0.011, 120.0, 0.0021)
     runs = ("yard/figure-eight", "yard/square", "field/rows")
-    effects = tuple(SavedEffect(one.name, one.title, one.parameters, one.units) for one in findings)
+    effects = tuple(JudgedEffect(one.name, one.title, one.parameters, one.units) for one in findings)
     return Diagnosis(
         runs=runs,
         vehicle=Vehicle("tracked-demo", Path("logs/vehicle.toml"), 0.08, 0.70, ticks_per_rev=32768),
@@ -186,7 +186,7 @@ def diagnosis(*findings: Finding) -> Diagnosis:
         parameters_after=replace(constants, track_m=replace(constants.track_m, value=0.70512)),
         noises=tuple(RunNoise(run, replace(noise, fix_scale=1.0 + 0.1 * k)) for k, run in enumerate(runs)),
         notices=(Notice("gnss.nmea", "sentences with a wrong checksum dropped", 12, "line 1023", "warning"),),
-        model=SavedModel("tracked-demo", constants, effects, dict.fromkeys(runs, noise), 0.86, "on the others"),
+        model=JudgedModel("tracked-demo", constants, effects, dict.fromkeys(runs, noise), 0.86, "on the others"),
     )  # fmt: skip
 
 

@@ -11,16 +11,27 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sccal.calibration.result import Estimate, History, Parameters, Trajectory
-from sccal.experiments.plan import EXPERIMENTS, PATHS, VARIANTS, Experiment, Variant
-from sccal.experiments.result import PARAMETERS, Cell, Experiments, Failed, Spread, VariantFigures
-from sccal.experiments.trial import Filtered, Trial
+from sccal.experiments.plan import EXPERIMENTS, PATHS, judged_s
 from sccal.report.as_json import json_text
 from sccal.report.experiments_figures import cell_drawings, convergence, overview_drawing
 from sccal.report.experiments_html import experiments_html
 from sccal.report.experiments_json import experiments_json
 from sccal.report.experiments_text import answers, experiments_text, headline, ratio_text, spread_text
 from sccal.report.experiments_write import write_experiments
+from sccal.results.calibration import Estimate, History, Parameters, Trajectory
+from sccal.results.experiments import (
+    PARAMETERS,
+    VARIANTS,
+    Cell,
+    Experiment,
+    Experiments,
+    Failed,
+    Filtered,
+    Spread,
+    Trial,
+    Variant,
+    VariantFigures,
+)
 from tests.report.pages import assert_page
 
 TRUTH = (0.0808, 0.0796, 0.728, 12.5)
@@ -71,7 +82,7 @@ def cell(
     off_percent: float = 0.1,
 ) -> Cell:
     """Errors of 0.2 m with and ratio times as much without; the radii and the track so many percent too long."""
-    begin, end = experiment.judged_s((0.0, float(T_S[-1])))
+    begin, end = judged_s(experiment, (0.0, float(T_S[-1])))
     judged = (begin < T_S) & (end >= T_S)
     error = np.where(judged, 0.2, 0.01) * (1.0 + 0.2 * np.sin(T_S))
     trial = Trial(

@@ -10,13 +10,12 @@ from typing import Any
 
 import pytest
 
-from sccal.calibration.result import Estimate, Noise, Parameters
-from sccal.calibration.saved_model import SavedEffect, SavedModel
 from sccal.effects.catalogue import CATALOGUE
-from sccal.effects.logged import Range
 from sccal.errors import DataError, UsageError
 from sccal.report.as_json import json_text
 from sccal.report.model_json import digest_of, model_from, model_json, read_model
+from sccal.results.calibration import Estimate, Noise, Parameters
+from sccal.results.model import JudgedEffect, JudgedModel, Range
 from tests.report.conftest import estimates
 
 NAN = float("nan")
@@ -25,14 +24,14 @@ NOISE = Noise(
 )
 
 
-def effect(name: str, run: str = "", told: bool = True, **shapes: float) -> SavedEffect:
+def effect(name: str, run: str = "", told: bool = True, **shapes: float) -> JudgedEffect:
     known = CATALOGUE[name]
     free = [one for one in known.parameters if not one.shape]
     parameters = {one.name: Estimate(0.1, 0.01, "estimated", "", None, one.prior_sigma) for one in free}
-    return SavedEffect(name, known.title, parameters, {p.name: p.unit for p in known.parameters}, shapes, run, told)
+    return JudgedEffect(name, known.title, parameters, {p.name: p.unit for p in known.parameters}, shapes, run, told)
 
 
-MODEL = SavedModel(
+MODEL = JudgedModel(
     "tracked-demo",
     estimates(),
     (
@@ -40,7 +39,7 @@ MODEL = SavedModel(
         effect("hard_iron", tau_s=22.0),
         effect("heading_step", run="yard/two", at_s=312.25),
         replace(effect("turn_slip", told=False), prior_scale=0.5),
-        SavedEffect(
+        JudgedEffect(
             "heading~motor_current_a",
             "motor_current_a turns the AHRS reading",
             {"deg_per_unit": Estimate(0.3, NAN, "estimated")},

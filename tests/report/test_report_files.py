@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import yaml
 
-from sccal.calibration.result import Calibration, Estimate, VehicleCalibration
 from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
 from sccal.report.write import write_calibration, write_numbers, write_vehicle
+from sccal.results.calibration import Calibration, Estimate, VehicleCalibration
 
 FIVE = {"calibration.json", "trajectory.csv", "trajectory.tum", "ros2_control.yaml", "report.html"}
 

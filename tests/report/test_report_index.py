@@ -21,8 +21,8 @@ from sccal.report.index_json import summary_json
 from sccal.report.index_lines import change_sentence, changes, headline
 from sccal.report.index_write import write_summary
 from sccal.results.saved import VEHICLE_RUN, Saved, read_saved
+from sccal.results.summary import ThinPath
 from sccal.summary import summarise
-from sccal.summary.result import ThinPath
 from tests.report.pages import assert_page
 from tests.summary.fleets import estimate, history, of_vehicle, written
 

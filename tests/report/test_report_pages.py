@@ -8,7 +8,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from sccal.calibration.result import (
+from sccal.report.advice import advice_on
+from sccal.report.figures import thinned
+from sccal.report.figures_outage import outage_plan
+from sccal.report.figures_run import run_drawings
+from sccal.report.html import run_html, vehicle_html
+from sccal.report.plan import drawn
+from sccal.report.verdict import run_verdict
+from sccal.results.calibration import (
     Calibration,
     Estimate,
     Fixes,
@@ -19,13 +26,6 @@ from sccal.calibration.result import (
     Trajectory,
     VehicleCalibration,
 )
-from sccal.report.advice import advice_on
-from sccal.report.figures import thinned
-from sccal.report.figures_outage import outage_plan
-from sccal.report.figures_run import run_drawings
-from sccal.report.html import run_html, vehicle_html
-from sccal.report.plan import drawn
-from sccal.report.verdict import run_verdict
 from tests.report.pages import assert_page
 
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.calibration.result import Calibration
 from sccal.report.pdf import run_pdf, width_of, wrapped
 from sccal.report.write import write_calibration
+from sccal.results.calibration import Calibration
 
 
 def pages(pdf: bytes) -> int:

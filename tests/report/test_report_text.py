@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from sccal.calibration.result import Calibration, VehicleCalibration
 from sccal.logs.streams import Notice
 from sccal.report.text import NOTICES_SHOWN, run_text, shortened, vehicle_text
+from sccal.results.calibration import Calibration, VehicleCalibration
 
 GOLDEN = Path(__file__).parent / "golden"
 

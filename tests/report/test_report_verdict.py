@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from sccal.calibration.result import Calibration, Missing, Status, VehicleCalibration
-from sccal.gates.result import BatchOutcome
 from sccal.report.as_json import calibration_json, vehicle_json
 from sccal.report.html import run_html
 from sccal.report.junit import junit_xml
 from sccal.report.step_summary import step_summary
 from sccal.report.text import run_text, vehicle_text
 from sccal.report.verdict import run_verdict, vehicle_verdict
+from sccal.results.calibration import Calibration, Missing, Status, VehicleCalibration
+from sccal.results.gates import BatchOutcome
 from sccal.results.saved import Saved
 
 

@@ -4,13 +4,70 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from sccal.arrays import Bools, Floats
-from sccal.calibration.result import Status
-from sccal.experiments.plan import Experiment, Variant
-from sccal.experiments.trial import Trial
+from sccal.results.calibration import History, Parameters, Status, Trajectory
 
 PARAMETERS = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_deg")
+Variant = Literal["without", "with"]
+VARIANTS: tuple[Variant, ...] = ("without", "with")
+"""The paper's SC EKF, and SC EKF with offset estimation."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One fault."""
+
+    key: str
+    title: str
+    sigma_m: float = 0.0
+    quality: int | None = None
+
+    @property
+    def is_loss(self) -> bool:
+        """Whether the fixes are lost, not noised."""
+        return self.sigma_m == 0.0
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """One variant on one trial."""
+
+    variant: Variant
+    error_m: Floats
+    """(n,) distance of the forward filter's position from the truth, at the truth's times."""
+    rms_m: float
+    """Over the judged times."""
+    end_m: float
+    """At the last of them."""
+    parameters: Parameters
+    path: Trajectory
+    history: History
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One drive under one fault."""
+
+    t_s: Floats
+    """(n,) from the start of the run."""
+    true_east_m: Floats
+    true_north_m: Floats
+    judged: Bools
+    """(n,) while the fault lasts."""
+    fix_t_s: Floats
+    """Of the fixes that the filters had, from the start of the run."""
+    fix_east_m: Floats
+    fix_north_m: Floats
+    filtered: tuple[Filtered, ...]
+    true_parameters: tuple[float, float, float, float] | None
+    offset_wander_rad: Floats | None = None
+    """(n,) what the magnetometer's offset was beyond its mean; None where nobody knows it."""
+
+    def of(self, variant: Variant) -> Filtered:
+        """One variant's part."""
+        return next(one for one in self.filtered if one.variant == variant)
 
 
 @dataclass(frozen=True)

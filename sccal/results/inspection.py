@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from sccal.align import Clock
 from sccal.arrays import Floats, Ints
 from sccal.logs.streams import Notice, Vehicle
+from sccal.results.clock import Clock
 
 StreamName = Literal["wheels", "heading", "fixes"]
 Shown = Literal["yes", "weak", "no"]

@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from sccal.align.clocks import Clock
 from sccal.arrays import Bools, Floats, Ints
-from sccal.filter.levels import Noise
 from sccal.logs.inputs import InputFile
 from sccal.logs.streams import Notice, Vehicle
+from sccal.results.clock import Clock
+from sccal.results.noise import Noise
 
 __all__ = [
     "AgainstReference",
