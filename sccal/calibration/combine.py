@@ -10,6 +10,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.calibration.outage import summarise
 from sccal.calibration.status import effect_estimates, judge
+from sccal.calibration.verdict import judged_vehicle
 from sccal.evidence.extension import Free, FreeEffects
 from sccal.evidence.joint import JointFit, fit_jointly
 from sccal.filter.iterate import At, RunProblem
@@ -36,16 +37,18 @@ def combine(runs: Sequence[Calibration], problems: Sequence[RunProblem]) -> Vehi
 
 def only_run(run: Calibration) -> VehicleCalibration:
     """The vehicle's result where there is one run."""
-    return VehicleCalibration(
-        run.vehicle,
-        run.with_offset,
-        (run,),
-        run.parameters,
-        run.fit,
-        run.outage,
-        None,
-        effects=run.effects,
-        held_out=run.held_out,
+    return judged_vehicle(
+        VehicleCalibration(
+            run.vehicle,
+            run.with_offset,
+            (run,),
+            run.parameters,
+            run.fit,
+            run.outage,
+            None,
+            effects=run.effects,
+            held_out=run.held_out,
+        )
     )
 
 
@@ -89,21 +92,23 @@ def combined(
             "vehicle's sigmas are widened to their scatter, and something that the model lacks differs between runs"
         )
         notices.append(Notice("vehicle", what, len(runs), "", "warning"))
-    return VehicleCalibration(
-        vehicle=vehicle,
-        with_offset=runs[0].with_offset,
-        runs=tuple(runs),
-        parameters=Parameters(parameters.radius_right_m, parameters.radius_left_m, parameters.track_m, offset),
-        fit=_pooled_fit([run.fit for run in runs]),
-        outage=summarise(
-            [window for run in runs for window in run.outage.windows],
-            runs[0].outage.window_s,
-            runs[0].outage.how.split(" from ")[0]
-            + " in every run; each judged by what its own run had learnt before it",
-        ),
-        consistency_chi2_per_dof=chi2_per_dof,
-        notices=tuple(notices),
-        effects=effects or {},
+    return judged_vehicle(
+        VehicleCalibration(
+            vehicle=vehicle,
+            with_offset=runs[0].with_offset,
+            runs=tuple(runs),
+            parameters=Parameters(parameters.radius_right_m, parameters.radius_left_m, parameters.track_m, offset),
+            fit=_pooled_fit([run.fit for run in runs]),
+            outage=summarise(
+                [window for run in runs for window in run.outage.windows],
+                runs[0].outage.window_s,
+                runs[0].outage.how.split(" from ")[0]
+                + " in every run; each judged by what its own run had learnt before it",
+            ),
+            consistency_chi2_per_dof=chi2_per_dof,
+            notices=tuple(notices),
+            effects=effects or {},
+        )
     )
 
 

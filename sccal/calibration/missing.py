@@ -10,6 +10,7 @@ is seen at once in the same quick fit, with the strongest of what it lacks and w
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,3 +92,12 @@ def _candidates(view: DriveView) -> list[Free]:
     named = plain_forms()
     columns, _ = without_shadows(named, [Free(one) for one in logged_effects([view.logged])], [view])
     return [*named, *columns]
+
+
+def missing_in_any(runs: Iterable[Sequence[Missing]]) -> tuple[Missing, ...]:
+    """What the model lacks in some run, each by the run that shows it most; the strongest first."""
+    strongest: dict[str, Missing] = {}
+    for one in (one for run in runs for one in run):
+        if one.effect not in strongest or one.evidence_nats > strongest[one.effect].evidence_nats:
+            strongest[one.effect] = one
+    return tuple(sorted(strongest.values(), key=lambda one: -one.evidence_nats))

@@ -24,6 +24,7 @@ from sccal.calibration.outage import run_with_outages
 from sccal.calibration.reference import judged_forward
 from sccal.calibration.status import effect_estimates, judge
 from sccal.calibration.unseen import unseen_parameters
+from sccal.calibration.verdict import judged_run
 from sccal.evidence.extension import FreeEffects
 from sccal.evidence.model import Accepted, Trust, bare_model, refitted, trust_in
 from sccal.filter.forward import ForwardPass, fix_nis
@@ -104,33 +105,35 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     lacking = look_for_missing(problem, values, options.heading_rate_hz)
     constants = lacking.widened(covariance[:4, :4])
     return (
-        Calibration(
-            run=aligned.name,
-            vehicle=aligned.vehicle,
-            with_offset=options.filter.with_offset,
-            parameters=judge(values[:4], constants, aligned.vehicle, options.filter, drive),
-            origin_lat_deg=aligned.plane.lat_deg,
-            origin_lon_deg=aligned.plane.lon_deg,
-            origin_alt_m=aligned.plane.alt_m,
-            fit=measure_fit(problem, final),
-            outage=outage,
-            noise=problem.noise,
-            drive=drive,
-            clock=aligned.clock,
-            trajectory=_trajectory(final),
-            history=_history(honest),
-            residuals=_residuals(problem, final),
-            fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
-            notices=(*aligned.notices, *_doubts(problem, final)),
-            effects=_effects(problem, values[4:], covariance[4:, 4:]),
-            on_the_way=_trajectory(honest),
-            against_reference=judged,
-            unseen=unseen_parameters(problem, values),
-            started_utc_s=_started_utc_s(aligned),
-            causes=find_causes(problem, final, values, start.moving_from_s + SETTLED_S),
-            consistency=consistency_over_time(problem, final),
-            manoeuvres=describe_manoeuvres(aligned, values),
-            missing=lacking.missing,
+        judged_run(
+            Calibration(
+                run=aligned.name,
+                vehicle=aligned.vehicle,
+                with_offset=options.filter.with_offset,
+                parameters=judge(values[:4], constants, aligned.vehicle, options.filter, drive),
+                origin_lat_deg=aligned.plane.lat_deg,
+                origin_lon_deg=aligned.plane.lon_deg,
+                origin_alt_m=aligned.plane.alt_m,
+                fit=measure_fit(problem, final),
+                outage=outage,
+                noise=problem.noise,
+                drive=drive,
+                clock=aligned.clock,
+                trajectory=_trajectory(final),
+                history=_history(honest),
+                residuals=_residuals(problem, final),
+                fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
+                notices=(*aligned.notices, *_doubts(problem, final)),
+                effects=_effects(problem, values[4:], covariance[4:, 4:]),
+                on_the_way=_trajectory(honest),
+                against_reference=judged,
+                unseen=unseen_parameters(problem, values),
+                started_utc_s=_started_utc_s(aligned),
+                causes=find_causes(problem, final, values, start.moving_from_s + SETTLED_S),
+                consistency=consistency_over_time(problem, final),
+                manoeuvres=describe_manoeuvres(aligned, values),
+                missing=lacking.missing,
+            )
         ),
         problem,
     )

@@ -183,9 +183,7 @@ class _Teller:
             if self._runs > 1:  # of one run alone, why says all
                 print(f"{source.name}: no result", flush=True)
         else:
-            from sccal.report.verdict import run_verdict
-
-            print(f"{source.name}: {run_verdict(result)}", flush=True)
+            print(f"{source.name}: {result.verdict}", flush=True)
 
 
 def _tell_batch(batch: Batch, out: Path, index: Path | None) -> None:

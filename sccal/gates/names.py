@@ -7,10 +7,11 @@ and of logged columns may hold dots themselves; what the document holds decides.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from sccal.results.numbers import listed
 from sccal.results.saved import PARAMETERS, Json
 
 FIELDS = ("value", "sigma", "status", "reason", "nominal", "prior_sigma")
@@ -71,7 +72,7 @@ def why_impossible(name: str) -> str:
     everything = [*known, *SINGLE, *(f"{block}.…" for block in OPEN)]
     tails = [one for one in known if one.partition(".")[2] == name]
     hint = f"; did you mean {tails[0]}?" if tails else near(name, everything)
-    return f"there is no {name}{hint or f'; names begin with {_and((*FIXED, *OPEN))}, or are {_and(SINGLE)}'}"
+    return f"there is no {name}{hint or f'; names begin with {listed((*FIXED, *OPEN))}, or are {listed(SINGLE)}'}"
 
 
 def look_up(document: Json, name: str) -> Named:
@@ -92,10 +93,6 @@ def look_up(document: Json, name: str) -> Named:
 def single_values(document: Json) -> Iterator[str]:
     """Every name of the document that stands for one value."""
     return _below(document, "")
-
-
-def _and(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _first_of(block: str) -> str:

@@ -13,6 +13,7 @@ from sccal.inspect.findings import findings
 from sccal.inspect.fixes import fix_facts, range_of
 from sccal.inspect.read import LogStreams, read_streams
 from sccal.inspect.together import bring_together
+from sccal.inspect.verdict import judged_log
 from sccal.inspect.witnesses import course_facts, witnesses
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, NMEA_FILE
 from sccal.logs.options import ReadOptions
@@ -46,26 +47,28 @@ def inspect_run(source: RunSource, options: ReadOptions | None = None) -> Inspec
     how = BY_PASS
     if not excited and drive is not None:
         excited, how = excited_by_shape(drive), BY_SHAPE
-    return Inspection(
-        run=source.name,
-        path=source.path,
-        vehicle=streams.vehicle,
-        declared=streams.declared,
-        unread=streams.unread,
-        span_s=together.span_s,
-        streams=facts,
-        fixes=fixes,
-        clock=together.clock,
-        drive=drive,
-        standstill=standstill_facts(together, moved),
-        witnesses=seen,
-        course=course,
-        columns=_columns(streams),
-        excited=excited,
-        excited_how=how,
-        findings=findings(streams, together, facts, fixes, drive, seen, course, refusal, doubts),
-        notices=(*streams.notices, *doubts),
-        series=series(together, moved),
+    return judged_log(
+        Inspection(
+            run=source.name,
+            path=source.path,
+            vehicle=streams.vehicle,
+            declared=streams.declared,
+            unread=streams.unread,
+            span_s=together.span_s,
+            streams=facts,
+            fixes=fixes,
+            clock=together.clock,
+            drive=drive,
+            standstill=standstill_facts(together, moved),
+            witnesses=seen,
+            course=course,
+            columns=_columns(streams),
+            excited=excited,
+            excited_how=how,
+            findings=findings(streams, together, facts, fixes, drive, seen, course, refusal, doubts),
+            notices=(*streams.notices, *doubts),
+            series=series(together, moved),
+        )
     )
 
 

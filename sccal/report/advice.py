@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from sccal.report.rows import Row, parameter_rows
-from sccal.report.verdict import Verdict
 from sccal.results.calibration import Calibration, Parameters, VehicleCalibration
+from sccal.results.verdict import Verdict
 
 Class = Literal["good", "partial", "doubtful", "unusable"]
 _USABLE: tuple[str, ...] = ("estimated",)

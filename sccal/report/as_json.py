@@ -16,8 +16,6 @@ from typing import Any
 from sccal import __version__
 from sccal.logs.streams import Notice
 from sccal.report.rows import parameter_rows
-from sccal.report.summary import missing_in_any
-from sccal.report.verdict import run_verdict, vehicle_verdict
 from sccal.results.calibration import (
     AgainstReference,
     Calibration,
@@ -49,7 +47,7 @@ def calibration_json(c: Calibration) -> Json:
             "vehicle": c.vehicle.name,
             "started": None if c.started_utc_s is None else utc_text(c.started_utc_s),
             "variant": variant_key(c.with_offset),
-            "verdict": str(run_verdict(c)),
+            "verdict": str(c.verdict),
             "parameters": parameter_blocks(c.parameters),
             "effects": _effects(c.effects),
             "origin": {"lat_deg": c.origin_lat_deg, "lon_deg": c.origin_lon_deg, "alt_m": c.origin_alt_m},
@@ -77,17 +75,16 @@ def vehicle_json(v: VehicleCalibration) -> Json:
             "run": VEHICLE_RUN,
             "vehicle": v.vehicle.name,
             "variant": variant_key(v.with_offset),
-            "verdict": str(vehicle_verdict(v)),
+            "verdict": str(v.verdict),
             "parameters": parameter_blocks(v.parameters),
             "effects": _effects(v.effects),
             "consistency_chi2_per_dof": v.consistency_chi2_per_dof,
             "fit": _fit(v.fit),
             "outage": _outage(v.outage),
             "held_out": _held_out(v.held_out),
-            "missing": [_missing(one) for one in missing_in_any([c.missing for c in v.runs])],
+            "missing": [_missing(one) for one in v.missing],
             "runs": [
-                {"run": c.run, "verdict": str(run_verdict(c)), "parameters": parameter_blocks(c.parameters)}
-                for c in v.runs
+                {"run": c.run, "verdict": str(c.verdict), "parameters": parameter_blocks(c.parameters)} for c in v.runs
             ],
             "notices": notice_blocks(v.notices),
         }

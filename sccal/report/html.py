@@ -16,16 +16,15 @@ from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import (
     clock_line,
     drive_line,
-    missing_in_any,
     missing_line,
     noise_facts,
     unseen_in_all,
     unseen_line,
     warnings_first,
 )
-from sccal.report.verdict import Verdict, run_verdict, vehicle_verdict
 from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.numbers import duration, one_line, plain, short
+from sccal.results.verdict import Verdict
 
 _PAGES = Environment(
     loader=PackageLoader("sccal.report", "templates"),
@@ -49,7 +48,7 @@ class RunLine:
 
 def run_html(c: Calibration) -> str:
     """The page of one run."""
-    verdict = run_verdict(c)
+    verdict = c.verdict
     return page(
         "run.html.j2",
         c=c,
@@ -73,7 +72,7 @@ def run_html(c: Calibration) -> str:
 
 def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     """The page of several runs; it links to each run's own page, ``<run>/report.html``."""
-    verdict = vehicle_verdict(v)
+    verdict = v.verdict
     count = f"{len(v.runs)} run{'' if len(v.runs) == 1 else 's'}"
     time = duration(sum(c.drive.duration_s for c in v.runs))
     chi2 = v.consistency_chi2_per_dof
@@ -90,7 +89,7 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
         fit=(
             ("runs", agreement),
             *fit_and_outage(v.fit, v.outage, v.held_out),
-            ("lacks", missing_line(missing_in_any([c.missing for c in v.runs]))),
+            ("lacks", missing_line(v.missing)),
             ("unseen", unseen_line(unseen_in_all([c.unseen for c in v.runs]))),
         ),
         notices=warnings_first(v.notices),
@@ -108,4 +107,4 @@ def page(template: str, **content: object) -> str:
 def _run_line(c: Calibration) -> RunLine:
     drift = "–" if c.outage.end_rms_m is None else plain(c.outage.end_rms_m, 2)
     link = "./" + quote(c.run, errors="replace") + "/report.html"
-    return RunLine(one_line(c.run), link, parameter_rows(c.parameters), drift, run_verdict(c))
+    return RunLine(one_line(c.run), link, parameter_rows(c.parameters), drift, c.verdict)

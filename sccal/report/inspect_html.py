@@ -14,7 +14,6 @@ from sccal.report.inspect_lines import (
     course_line,
     drive_lines,
     fixes_lines,
-    log_verdict,
     run_line,
     sigmas_text,
     standstill_line,
@@ -47,7 +46,7 @@ def inspection_html(i: Inspection) -> str:
     return page(
         "inspect.html.j2",
         i=i,
-        verdict=log_verdict(i),
+        verdict=i.verdict,
         title=one_line(i.run),
         sub=run_line(i),
         header=STREAM_HEADER,

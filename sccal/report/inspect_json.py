@@ -12,7 +12,6 @@ from typing import Any
 
 from sccal import __version__
 from sccal.report.as_json import Json, clock_block, notice_blocks, strict_document
-from sccal.report.inspect_lines import log_verdict
 from sccal.results.inspection import DriveFacts, Excited, FixFacts, Inspection, StandstillFacts, StreamFacts
 
 SCHEMA = "sccal.inspect/1"
@@ -46,7 +45,7 @@ def _run(i: Inspection) -> Json:
             "ticks_per_rev": vehicle.ticks_per_rev,
             "convention": vehicle.convention,
         },
-        "verdict": str(log_verdict(i)),
+        "verdict": str(i.verdict),
         "calibratable": not i.refused,
         "unread": [{"what": one.what, "error": one.why} for one in i.unread],
         "span": {"start_s": i.span_s[0], "end_s": i.span_s[1]},

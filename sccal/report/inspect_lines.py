@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sccal.inspect.drive import SECTORS, STANDSTILL_S
 from sccal.report.summary import clock_line
@@ -22,42 +21,11 @@ from sccal.results.inspection import (
     StreamName,
     Witness,
 )
-from sccal.results.numbers import MISSING, duration, one_line, plain, short
+from sccal.results.numbers import MISSING, duration, listed, one_line, plain, short
 
 COLUMNS_TOLD = 12
-FINDINGS_IN_VERDICT = 3
 LEAST_M = 0.1
 """Of driving backwards: less is a wheel that settles."""
-
-
-@dataclass(frozen=True)
-class LogVerdict:
-    """good: a calibration can begin. partial: it can, with doubts. doubtful: it would refuse this log as it is."""
-
-    level: str
-    because: tuple[str, ...]
-
-    def __str__(self) -> str:
-        return f"{self.level}: {'; '.join(self.because)}"
-
-
-def log_verdict(i: Inspection) -> LogVerdict:
-    """The first line: can this log be calibrated?"""
-    refusals = [one_line(one.text) for one in i.findings if one.weight == "refused"]
-    if refusals:
-        return LogVerdict("doubtful – a calibration would refuse this log", _some(refusals))
-    warnings = [one_line(one.text) for one in i.findings if one.weight == "warning"]
-    if warnings:
-        return LogVerdict("partial – a calibration is possible and may be wrong", _some(warnings))
-    lacking = [one.title for one in i.excited[:3] if one.shown != "yes"]
-    if lacking:
-        return LogVerdict("partial", (f"this drive shows {_and(lacking)} badly or not at all",))
-    return LogVerdict("good", ("all streams are there and agree, and the drive shows radii, track and heading offset",))
-
-
-def _some(texts: Sequence[str]) -> tuple[str, ...]:
-    more = len(texts) - FINDINGS_IN_VERDICT
-    return (*texts[:FINDINGS_IN_VERDICT], *((f"{more} more below",) if more > 0 else ()))
 
 
 def fixes_lines(f: FixFacts | None) -> tuple[str, ...]:
@@ -183,7 +151,7 @@ def _with_advice(excited: Sequence[Excited]) -> tuple[str, ...]:
     for one in excited:
         lines.setdefault((one.advice, one.same_as), []).append(one.name)
     return tuple(
-        f"{', '.join(names)}{f' (here the same as {_and(same)})' if same else ''}: {advice}"
+        f"{', '.join(names)}{f' (here the same as {listed(same)})' if same else ''}: {advice}"
         for (advice, same), names in lines.items()
     )
 
@@ -295,7 +263,3 @@ def _count(number: int, noun: str, rest: str = "") -> str:
 
 def _degrees(angle_rad: float) -> str:
     return f"{math.degrees(angle_rad):.0f} deg"
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

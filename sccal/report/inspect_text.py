@@ -13,7 +13,6 @@ from sccal.report.inspect_lines import (
     drive_lines,
     excited_lines,
     fixes_lines,
-    log_verdict,
     run_line,
     standstill_line,
     stream_rows,
@@ -35,7 +34,7 @@ _SAYS: dict[Shown, str] = {"yes": "shows", "weak": "weakly", "no": "not"}
 def inspection_text(i: Inspection, width: int = 100) -> str:
     """One log in full."""
     lines = [
-        *wrapped(str(log_verdict(i)), width),
+        *wrapped(str(i.verdict), width),
         "",
         *wrapped(run_line(i), width),
         "",
@@ -53,7 +52,7 @@ def inspection_text(i: Inspection, width: int = 100) -> str:
         lines += ["", *wrapped(f"What this drive shows, by {i.excited_how}:", width)]
         for shown, texts in excited_lines(i):
             lines += labelled(_SAYS[shown], texts, width)
-    first = log_verdict(i).because
+    first = i.verdict.because
     told = [
         f"{'' if one.weight == 'note' else f'{one.weight}: '}{one.text}"
         for one in i.findings

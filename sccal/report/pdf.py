@@ -26,7 +26,6 @@ from sccal.report.panel import Sheet
 from sccal.report.plan import Plan
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.summary import clock_line, drive_line, noise_facts, notice_text, warnings_first
-from sccal.report.verdict import run_verdict
 from sccal.results.calibration import Calibration
 from sccal.results.numbers import one_line
 
@@ -61,7 +60,7 @@ def run_pdf(c: Calibration) -> bytes:
 
 
 def _opening(paper: _Paper, c: Calibration) -> None:
-    verdict = run_verdict(c)
+    verdict = c.verdict
     advice = advice_on(c, verdict)
     paper.paragraph(one_line(c.run), TITLE, bold=True)
     date = started(c)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from sccal.results.calibration import Estimate, Parameters, Status
-from sccal.results.numbers import MISSING, change_percent, one_line, short, value_and_sigma, with_sigma, wrapped_deg
+from sccal.results.numbers import MISSING, change_percent, one_line, short, value_and_sigma, with_sigma
 
 STATUS_WORDS: Mapping[Status, str] = {
     "estimated": "estimated",
@@ -71,12 +70,13 @@ class Row:
 
 def parameter_rows(parameters: Parameters) -> tuple[Row, Row, Row, Row]:
     """The four constants of the paper's state, the heading offset in degrees."""
-    return (
-        Row("radius_right_m", "right radius", "m", parameters.radius_right_m),
-        Row("radius_left_m", "left radius", "m", parameters.radius_left_m),
-        Row("track_m", "track", "m", parameters.track_m),
-        Row("heading_offset_deg", "heading offset", "deg", offset_in_degrees(parameters.heading_offset_rad)),
+    names = ("right radius", "left radius", "track", "heading offset")
+    units = ("m", "m", "m", "deg")
+    right, left, track, offset = (
+        Row(key, name, unit, estimate)
+        for (key, estimate), name, unit in zip(parameters.by_key.items(), names, units, strict=True)
     )
+    return right, left, track, offset
 
 
 def effect_rows(effects: Mapping[str, Mapping[str, Estimate]]) -> tuple[Row, ...]:
@@ -85,17 +85,6 @@ def effect_rows(effects: Mapping[str, Mapping[str, Estimate]]) -> tuple[Row, ...
         Row(f"{effect}.{name}", f"{effect} {_without_unit(name)}".replace("_", " ").strip(), _unit_of(name), estimate)
         for effect, parameters in effects.items()
         for name, estimate in parameters.items()
-    )
-
-
-def offset_in_degrees(offset: Estimate) -> Estimate:
-    """The heading offset wrapped into (−180, 180]; its spreads only converted."""
-    return replace(
-        offset,
-        value=wrapped_deg(offset.value),
-        sigma=math.degrees(offset.sigma),
-        nominal=None if offset.nominal is None else wrapped_deg(offset.nominal),
-        prior_sigma=None if offset.prior_sigma is None else math.degrees(offset.prior_sigma),
     )
 
 

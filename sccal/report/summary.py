@@ -81,15 +81,6 @@ def missing_line(missing: Sequence[Missing]) -> str:
     return one_line(f"by a quick look, {', '.join(parts)}; see `sccal diagnose`") if parts else ""
 
 
-def missing_in_any(runs: Iterable[Sequence[Missing]]) -> tuple[Missing, ...]:
-    """What the model lacks in some run, each by the run that shows it most; the strongest first."""
-    strongest: dict[str, Missing] = {}
-    for one in (one for run in runs for one in run):
-        if one.effect not in strongest or one.evidence_nats > strongest[one.effect].evidence_nats:
-            strongest[one.effect] = one
-    return tuple(sorted(strongest.values(), key=lambda one: -one.evidence_nats))
-
-
 def reference_lines(judged: AgainstReference | None) -> tuple[str, ...]:
     """What fixes that the filter never saw say: a line for each loss, one for all displaced fixes."""
     if judged is None:

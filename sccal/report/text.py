@@ -15,7 +15,6 @@ from sccal.report.summary import (
     fixes_line,
     headings_line,
     held_out_line,
-    missing_in_any,
     missing_line,
     noise_facts,
     notice_text,
@@ -25,7 +24,6 @@ from sccal.report.summary import (
     unseen_in_all,
     unseen_line,
 )
-from sccal.report.verdict import run_verdict, vehicle_verdict
 from sccal.results.calibration import Calibration, Estimate, Noise, Parameters, Status, VehicleCalibration
 from sccal.results.numbers import duration, one_line, plain, short, value_and_sigma
 
@@ -43,7 +41,7 @@ _MARKS_MEAN = {"?": "? not observed", "!": "! at bound", "=": "= held"}
 def run_text(c: Calibration, width: int = 100) -> str:
     """One run in full."""
     lines = [
-        *wrapped(str(run_verdict(c)), width),
+        *wrapped(str(c.verdict), width),
         "",
         *wrapped(f"{c.run} ({c.vehicle.name}): {drive_line(c.drive)}", width),
         "",
@@ -70,7 +68,7 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
     time = duration(sum(c.drive.duration_s for c in v.runs))
     notices = [("", n) for n in v.notices] + [(c.run, n) for c in v.runs for n in c.notices]
     lines = [
-        *wrapped(str(vehicle_verdict(v)), width),
+        *wrapped(str(v.verdict), width),
         "",
         *_run_table(v.runs, width),
         "",
@@ -83,7 +81,7 @@ def vehicle_text(v: VehicleCalibration, width: int = 100) -> str:
         *labelled("heading", [headings_line(v.fit)], width),
         *labelled("filter", [recoveries_line(v.fit)], width),
         *labelled("drift", [held_out_line(v.held_out, v.outage.window_s), outage_line(v.outage)], width),
-        *labelled("lacks", [missing_line(missing_in_any([c.missing for c in v.runs]))], width),
+        *labelled("lacks", [missing_line(v.missing)], width),
         *labelled("judged", _judged_runs(v.runs), width),
         *labelled("unseen", [unseen_line(unseen_in_all([c.unseen for c in v.runs]))], width),
         *labelled("notices", notice_lines(notices, "the runs' calibration.json"), width),
@@ -123,7 +121,7 @@ def _parameter_table(rows: Sequence[Row], width: int) -> list[str]:
 
 def _run_table(runs: Sequence[Calibration], width: int) -> list[str]:
     header = ("R_right mm", "R_left mm", "track mm", "offset deg", "drift m", "verdict")
-    cells = [(*_compact(c.parameters), _drift(c), run_verdict(c).level) for c in runs]
+    cells = [(*_compact(c.parameters), _drift(c), c.verdict.level) for c in runs]
     columns = [_flush(column) for column in zip(header, *cells, strict=True)]
     room = width - _width_of(columns)
     if room < NARROWEST_NAME:
@@ -143,7 +141,7 @@ def _run_doubts(runs: Sequence[Calibration], width: int) -> list[str]:
     doubts = []
     for c in runs:
         name = shortened(one_line(c.run), 40)
-        verdict = run_verdict(c)
+        verdict = c.verdict
         if verdict.level != "good":
             doubts.append(f"{name}: {verdict}")
         doubts += [f"{name}: {row.name}: {row.reason}" for row in parameter_rows(c.parameters) if row.reason]

@@ -5,6 +5,7 @@ Angles are in radians here and become degrees only where they are written or pri
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -14,6 +15,8 @@ from sccal.logs.inputs import InputFile
 from sccal.logs.streams import Notice, Vehicle
 from sccal.results.clock import Clock
 from sccal.results.noise import Noise
+from sccal.results.numbers import wrapped_deg
+from sccal.results.verdict import Verdict
 
 __all__ = [
     "AgainstReference",
@@ -43,6 +46,10 @@ __all__ = [
 ]
 
 Status = Literal["estimated", "unobserved", "at_bound", "held"]
+PARAMETERS = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_deg")
+"""Names of the constants in files."""
+OFFSET_KEY = PARAMETERS[3]
+UNJUDGED = Verdict("doubtful", ("not judged yet",))
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,18 @@ class Estimate:
     """The declared prior value; None where there is none (the heading offset)."""
     prior_sigma: float | None = None
 
+    @property
+    def in_degrees(self) -> Estimate:
+        """An angle in radians: its values wrapped into (−180, 180], its spreads only converted."""
+        return Estimate(
+            wrapped_deg(self.value),
+            math.degrees(self.sigma),
+            self.status,
+            self.reason,
+            None if self.nominal is None else wrapped_deg(self.nominal),
+            None if self.prior_sigma is None else math.degrees(self.prior_sigma),
+        )
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -68,6 +87,12 @@ class Parameters:
     track_m: Estimate
     heading_offset_rad: Estimate
     """What the AHRS reads, turned into enu, minus the robot's heading; in (−π, π]."""
+
+    @property
+    def by_key(self) -> dict[str, Estimate]:
+        """By their names in files, which are PARAMETERS: the heading offset in degrees."""
+        right, left, track = self.radius_right_m, self.radius_left_m, self.track_m
+        return dict(zip(PARAMETERS, (right, left, track, self.heading_offset_rad.in_degrees), strict=True))
 
 
 @dataclass(frozen=True)
@@ -337,6 +362,7 @@ class Calibration:
     """What the model seems to lack, the strongest first."""
     held_out: HeldOut | None = None
     """By stretches of the run; None where it is too short to leave any out."""
+    verdict: Verdict = UNJUDGED
 
 
 @dataclass(frozen=True)
@@ -357,3 +383,6 @@ class VehicleCalibration:
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     held_out: HeldOut | None = None
     """The same quantity as before and after of a diagnosis; None where no run is long enough to leave stretches out."""
+    missing: tuple[Missing, ...] = ()
+    """What the model seems to lack in some run, the strongest first."""
+    verdict: Verdict = UNJUDGED

@@ -12,7 +12,9 @@ from typing import Literal
 
 from sccal.arrays import Floats, Ints
 from sccal.logs.streams import Notice, Vehicle
+from sccal.results.calibration import UNJUDGED
 from sccal.results.clock import Clock
+from sccal.results.verdict import Verdict
 
 StreamName = Literal["wheels", "heading", "fixes"]
 Shown = Literal["yes", "weak", "no"]
@@ -265,6 +267,7 @@ class Inspection:
     findings: tuple[Finding, ...]
     notices: tuple[Notice, ...]
     series: Series
+    verdict: Verdict = UNJUDGED
 
     @property
     def refused(self) -> bool:

@@ -8,6 +8,7 @@ MOST_DIGITS.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 
 MISSING = "n/a"
@@ -116,3 +117,8 @@ def _exponent(value: float) -> int:
 def _exponent_at_two_digits(sigma: float) -> int:
     """Decimal exponent of sigma's first digit once it is rounded to two: 0.000999 becomes 0.0010."""
     return int(f"{sigma:.1e}".partition("e")[2])
+
+
+def listed(names: Sequence[str]) -> str:
+    """One or more names as a sentence lists them: ``a, b and c``."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sccal.align import align
+from sccal.calibration.verdict import run_verdict
 from sccal.errors import DataError
-from sccal.report.verdict import run_verdict
 from tests.runs import read, written
 
 

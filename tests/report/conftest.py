@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sccal.calibration.verdict import judged_run, judged_vehicle
 from sccal.logs.streams import Notice, Vehicle
 from sccal.results.calibration import (
     Calibration,
@@ -144,30 +145,32 @@ def run(
     offset = learnt(math.radians(-3.2145), 0.3, math.radians(0.15), 0.5, 3)
     history = History(t + START_S, right[0], left[0], track[0], offset[0], right[1], left[1], track[1], offset[1])
 
-    return Calibration(
-        run=name,
-        vehicle=VEHICLE,
-        with_offset=True,
-        parameters=p,
-        origin_lat_deg=37.525,
-        origin_lon_deg=15.074,
-        fit=Fit(0.0234, math.radians(0.91), 1.04, 0.97, 1488, 12, 5991, 9, 0),
-        outage=outage(),
-        noise=Noise(math.radians(0.42), math.radians(0.8), 17.3, 1.12, 0.011, 120.0, 0.0021),
-        drive=Drive(duration_s, 412.3, 23.1, 12.0, 1.93, 18.9, 18.7),
-        clock=Clock("utc_mapped", -1.2034, 23.4, 0.0042, 2),
-        trajectory=path,
-        history=history,
-        residuals=residuals,
-        fixes=fixes,
-        causes=causes(rng),
-        consistency=consistency(duration_s, rng),
-        manoeuvres=MANOEUVRES,
-        held_out=HeldOut(0.0301, 0.0552, "each of 4 stretches of the run judged by a fit that saw nothing of it"),
-        notices=(
-            Notice("encoder.csv", "rows with text cells dropped", 3, "line 40"),
-            Notice("gnss.nmea", "sentences with a wrong checksum dropped", 12, "line 1023", "warning"),
-        ),
+    return judged_run(
+        Calibration(
+            run=name,
+            vehicle=VEHICLE,
+            with_offset=True,
+            parameters=p,
+            origin_lat_deg=37.525,
+            origin_lon_deg=15.074,
+            fit=Fit(0.0234, math.radians(0.91), 1.04, 0.97, 1488, 12, 5991, 9, 0),
+            outage=outage(),
+            noise=Noise(math.radians(0.42), math.radians(0.8), 17.3, 1.12, 0.011, 120.0, 0.0021),
+            drive=Drive(duration_s, 412.3, 23.1, 12.0, 1.93, 18.9, 18.7),
+            clock=Clock("utc_mapped", -1.2034, 23.4, 0.0042, 2),
+            trajectory=path,
+            history=history,
+            residuals=residuals,
+            fixes=fixes,
+            causes=causes(rng),
+            consistency=consistency(duration_s, rng),
+            manoeuvres=MANOEUVRES,
+            held_out=HeldOut(0.0301, 0.0552, "each of 4 stretches of the run judged by a fit that saw nothing of it"),
+            notices=(
+                Notice("encoder.csv", "rows with text cells dropped", 3, "line 40"),
+                Notice("gnss.nmea", "sentences with a wrong checksum dropped", 12, "line 1023", "warning"),
+            ),
+        )
     )
 
 
@@ -175,44 +178,49 @@ def ugly_run(name: str = "campaign-2024-06-01/very/deep/folder/with-a-name-that-
     """At a bound, unobserved, without sigma, without windows, locked out, and chatty."""
     good = run(name, duration_s=20.0)
     nan = float("nan")
-    return replace(
-        good,
-        parameters=Parameters(
-            Estimate(0.096, 0.00001, "at_bound", "20 % above nominal: check ticks_per_rev", 0.08, 0.0016),
-            Estimate(0.0799, nan, "estimated", "", 0.08, 0.0016),
-            Estimate(
-                0.70,
-                0.05,
-                "unobserved",
-                "turned 2 deg in all: drive circles to both sides, at least one full turn each, and calibrate again",
-                0.70,
-                0.05,
+    return judged_run(
+        replace(
+            good,
+            parameters=Parameters(
+                Estimate(0.096, 0.00001, "at_bound", "20 % above nominal: check ticks_per_rev", 0.08, 0.0016),
+                Estimate(0.0799, nan, "estimated", "", 0.08, 0.0016),
+                Estimate(
+                    0.70,
+                    0.05,
+                    "unobserved",
+                    "turned 2 deg in all: drive circles to both sides, at least one full turn each, "
+                    "and calibrate again",
+                    0.70,
+                    0.05,
+                ),
+                Estimate(0.0, 0.0, "held", "", None, None),
             ),
-            Estimate(0.0, 0.0, "held", "", None, None),
-        ),
-        fit=Fit(nan, math.radians(0.3), 7.3, 0.97, 30, 70, 400, 0, 3),
-        outage=outage(0),
-        held_out=None,
-        clock=Clock("host", 0.0, 0.0, nan, 2),
-        notices=tuple(
-            Notice(f"column_{k}.csv", "cells were empty", k + 1, f"line {k}", "warning" if k in (4, 8) else "info")
-            for k in range(10)
-        ),
+            fit=Fit(nan, math.radians(0.3), 7.3, 0.97, 30, 70, 400, 0, 3),
+            outage=outage(0),
+            held_out=None,
+            clock=Clock("host", 0.0, 0.0, nan, 2),
+            notices=tuple(
+                Notice(f"column_{k}.csv", "cells were empty", k + 1, f"line {k}", "warning" if k in (4, 8) else "info")
+                for k in range(10)
+            ),
+        )
     )
 
 
 def vehicle(*runs: Calibration) -> VehicleCalibration:
     notices = (Notice("run 3", "runs left out of the vehicle's fit, nothing observed", 1, "", "warning"),)
-    return VehicleCalibration(
-        VEHICLE,
-        True,
-        tuple(runs),
-        estimates(),
-        runs[0].fit,
-        outage(16),
-        1.21 if len(runs) > 1 else None,
-        notices,
-        held_out=HeldOut(0.0411, 0.0713, "each of 3 runs judged by constants fitted on the 2 others"),
+    return judged_vehicle(
+        VehicleCalibration(
+            VEHICLE,
+            True,
+            tuple(runs),
+            estimates(),
+            runs[0].fit,
+            outage(16),
+            1.21 if len(runs) > 1 else None,
+            notices,
+            held_out=HeldOut(0.0411, 0.0713, "each of 3 runs judged by constants fitted on the 2 others"),
+        )
     )
 
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from sccal.calibration.verdict import judged_run, judged_vehicle, run_verdict, vehicle_verdict
 from sccal.report.as_json import calibration_json, vehicle_json
 from sccal.report.html import run_html
 from sccal.report.junit import junit_xml
 from sccal.report.step_summary import step_summary
 from sccal.report.text import run_text, vehicle_text
-from sccal.report.verdict import run_verdict, vehicle_verdict
 from sccal.results.calibration import Calibration, Missing, Status, VehicleCalibration
 from sccal.results.gates import BatchOutcome
 from sccal.results.saved import Saved
@@ -52,8 +52,8 @@ def test_what_the_model_lacks_is_a_doubt(a_run: Calibration) -> None:
 def test_what_one_run_shows_missing_is_the_vehicle_s_doubt(a_run: Calibration, a_vehicle: VehicleCalibration) -> None:
     weaker = replace(ARM, evidence_nats=30.0)
     runs = (replace(a_run, missing=(weaker,)), replace(a_run, missing=(SLIP, ARM)), a_run)
-    vehicle = replace(a_vehicle, runs=runs, consistency_chi2_per_dof=1.0)
-    assert vehicle_verdict(vehicle).because == (f"`sccal diagnose` would name {ARM.title} and {SLIP.title}",)
+    vehicle = judged_vehicle(replace(a_vehicle, runs=runs, consistency_chi2_per_dof=1.0))
+    assert vehicle.verdict.because == (f"`sccal diagnose` would name {ARM.title} and {SLIP.title}",)
     assert vehicle_json(vehicle)["missing"][0] == {
         "effect": "lever_arm", "title": ARM.title, "evidence_nats": 812.4, "size": 8.0
     }  # fmt: skip
@@ -62,7 +62,7 @@ def test_what_one_run_shows_missing_is_the_vehicle_s_doubt(a_run: Calibration, a
 
 
 def test_what_the_model_lacks_is_told_wherever_the_run_is(a_run: Calibration) -> None:
-    lacking = replace(a_run, missing=(ARM,))
+    lacking = judged_run(replace(a_run, missing=(ARM,)))
     assert calibration_json(lacking)["missing"] == [
         {"effect": "lever_arm", "title": ARM.title, "evidence_nats": 812.4, "size": 8.0}
     ]

@@ -1,17 +1,25 @@
-"""The first line of every report: may these numbers be used? Decided from statuses and figures of fit, nothing else."""
+"""May a calibration's numbers be used? Decided from statuses and figures of fit, nothing else."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import replace
 
+from sccal.calibration.missing import missing_in_any
 from sccal.calibration.status import fixes_wander, heading_wanders
-from sccal.report.rows import parameter_rows
-from sccal.report.summary import missing_in_any
-from sccal.results.calibration import Calibration, Estimate, Fit, Missing, Noise, Parameters, VehicleCalibration
+from sccal.results.calibration import (
+    OFFSET_KEY,
+    Calibration,
+    Estimate,
+    Fit,
+    Missing,
+    Noise,
+    Parameters,
+    VehicleCalibration,
+)
 from sccal.results.numbers import short
+from sccal.results.verdict import Verdict
 
 NIS_LOW = 0.3
 NIS_HIGH = 3.0
@@ -23,18 +31,16 @@ CONSISTENCY_HIGH = 3.0
 MISSING_NAMED = 3
 """Effects that the model lacks, in the words of a verdict; the others by their number."""
 
-Level = Literal["good", "partial", "doubtful"]
+
+def judged_run(calibration: Calibration) -> Calibration:
+    """The calibration of one run with its verdict."""
+    return replace(calibration, verdict=run_verdict(calibration))
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """good: use it. partial: use what was estimated. doubtful: find out why before using it."""
-
-    level: Level
-    because: tuple[str, ...]
-
-    def __str__(self) -> str:
-        return f"{self.level}: {'; '.join(self.because)}"
+def judged_vehicle(vehicle: VehicleCalibration) -> VehicleCalibration:
+    """The calibration of a vehicle with what it lacks in some run, and with its verdict."""
+    vehicle = replace(vehicle, missing=missing_in_any([run.missing for run in vehicle.runs]))
+    return replace(vehicle, verdict=vehicle_verdict(vehicle))
 
 
 def run_verdict(calibration: Calibration) -> Verdict:
@@ -55,14 +61,12 @@ def vehicle_verdict(vehicle: VehicleCalibration) -> Verdict:
         if chi2 is not None and not chi2 <= CONSISTENCY_HIGH
         else ()
     )
-    missing = _missing_doubts(missing_in_any([run.missing for run in vehicle.runs]))
+    missing = _missing_doubts(vehicle.missing)
     return _verdict(vehicle.parameters, vehicle.fit, vehicle.with_offset, [*missing, *disagreement])
 
 
 def _verdict(parameters: Parameters, fit: Fit, with_offset: bool, further_doubts: Iterable[str]) -> Verdict:
-    wanted = [
-        (row.key, row.estimate) for row in parameter_rows(parameters) if with_offset or row.key != "heading_offset_deg"
-    ]
+    wanted = [(key, estimate) for key, estimate in parameters.by_key.items() if with_offset or key != OFFSET_KEY]
     doubts = [*_parameter_doubts(wanted), *_fit_doubts(fit), *further_doubts]
     lacks = [
         f"{key} {'not observed' if estimate.status == 'unobserved' else 'held'}"
