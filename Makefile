@@ -8,7 +8,7 @@ FUZZ_SECONDS ?= 60
 .DEFAULT_GOAL := help
 STUDY_OUT ?= docs
 
-.PHONY: help run test test-slow lint bench fuzz study-noise study-effects study-parking study-field samples clean
+.PHONY: help run test test-slow lint bench fuzz study-noise study-effects study-parking study-field samples schemas clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -48,6 +48,9 @@ study-field: $(VENV)/.ready-dev ## logs as people really write them: 300 situati
 
 samples: $(VENV)/.ready ## make sample_logs/ anew (seeded: the same bytes every time)
 	$(BIN)/sccal simulate --samples sample_logs
+
+schemas: $(VENV)/.ready ## write the JSON Schema of every document into docs/schemas/
+	$(BIN)/python docs/schemas.py
 
 clean: ## remove the environment, caches and results
 	rm -rf $(VENV) $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis dist build

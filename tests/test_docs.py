@@ -19,8 +19,9 @@ import pytest
 from sccal.cli import main
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import Run
-from tests.compare.test_diagnoses import diagnosis, finding
+from tests.compare.test_diagnoses import document, finding
 from tests.message_logs import json_bytes, messages_of, stamp, write_mcap, write_ros1
+from tests.results.documents import held_to_its_schema, schema_file
 from tests.runs import written
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -63,7 +64,7 @@ def materials(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(folder / "out" / "vehicle.json", folder / "previous.json")
     for name, *found in (("before",), ("after", finding("lever_arm", forward_m=(0.3, 0.01)))):
         (folder / name).mkdir()
-        (folder / name / "diagnosis.json").write_text(json.dumps(diagnosis(*found).document))
+        (folder / name / "diagnosis.json").write_text(json.dumps(document(*found)))
     return folder
 
 
@@ -134,6 +135,10 @@ def test_every_command_of_a_page_works(page, materials, tmp_path, monkeypatch):
             arguments += SHORTER.get(arguments[0], [])
         allowed = (0, 1) if "--fail-on-change" in arguments else (0,)
         assert executed(arguments) in allowed, line
+    for path in tmp_path.rglob("[!.]*.json"):
+        document = json.loads(path.read_text("utf-8"))
+        if "sccal_version" in document and schema_file(document).exists():
+            held_to_its_schema(document)
 
 
 def executed(arguments: list[str]) -> int:

@@ -25,7 +25,6 @@ from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource
 from sccal.report.write import begin_loading, write_vehicle
 from sccal.results.calibration import Calibration, VehicleCalibration
-from sccal.results.saved import RESULT_FILE, Saved, read_saved
 
 Told = Callable[[Source, Calibration | SccalError], None]
 
@@ -46,15 +45,11 @@ class Progress(Protocol):
 class Batch:
     """What one call found and wrote."""
 
-    calibrated: list[Calibration] = field(default_factory=list)
+    runs: list[Calibration] = field(default_factory=list)
     """In the order of the runs; without arrays over time."""
-    saved: list[Saved] = field(default_factory=list)
-    """The same as their calibration.json tells them."""
     failures: list[Failure] = field(default_factory=list)
     vehicles: list[tuple[VehicleCalibration, Path]] = field(default_factory=list)
     """Each with the JSON file that was written."""
-    saved_vehicles: list[Saved] = field(default_factory=list)
-    """The same as their files tell them."""
     unchanged: int = 0
     """How many of the runs stood already and were not repeated."""
 
@@ -166,17 +161,16 @@ class _Runs:
                 self.batch.failures.append(Failure(source.name, result))
                 self.tell(source, result)
             else:
-                self.batch.calibrated.append(result.calibration)
                 self.tell(source, result.calibration)
             self.told += 1
 
     def into_vehicles(self, crew: Crew) -> None:
-        """The vehicles from their runs, all files written and read again."""
+        """The vehicles from their runs, and their files."""
         of_vehicle: dict[tuple[object, ...], list[Member]] = {}
         for task, result in zip(self.tasks, self.results, strict=True):
             if isinstance(result, RunRecord):
                 of_vehicle.setdefault(identity_of(result.calibration.vehicle), []).append(Member(task, result))
-                self.batch.saved.append(read_saved(self.out / task.source.name / RESULT_FILE))
+                self.batch.runs.append(result.calibration)
         taken: set[str] = set()
         for members in of_vehicle.values():
             declared = members[0].record.calibration.vehicle.name
@@ -189,4 +183,3 @@ class _Runs:
             stem = "vehicle" if len(of_vehicle) == 1 else free_stem(f"vehicle-{name}", taken)
             write_vehicle(vehicle, self.out, stem)
             self.batch.vehicles.append((vehicle, self.out / f"{stem}.json"))
-            self.batch.saved_vehicles.append(read_saved(self.out / f"{stem}.json"))

@@ -10,7 +10,7 @@ from pathlib import Path
 from sccal.batch.record import RECORD_FILE, FileMark, RunRecord, record_from, record_text
 from sccal.errors import UsageError
 from sccal.report.write import MCAP_FILE, PDF_FILE
-from sccal.results.saved import RESULT_FILE
+from sccal.results.files import RESULT_FILE
 
 _UNFINISHED = ".part"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from sccal.batch.calibrating import Batch
@@ -21,8 +22,9 @@ def judged(batch: Batch, asked: Asked) -> BatchOutcome:
     Raises:
         UsageError: a gate asks for what no result has, or the baseline is of other vehicles.
     """
-    gates = asked.judge(batch.saved, batch.saved_vehicles)
-    return BatchOutcome(tuple(batch.saved), tuple(batch.saved_vehicles), tuple(batch.failures), gates)
+    runs, vehicles = tuple(batch.runs), {path.name: vehicle for vehicle, path in batch.vehicles}
+    gates = asked.judge(runs, tuple(vehicles.values()))
+    return BatchOutcome(runs, vehicles, tuple(batch.failures), gates)
 
 
 def write_outcome(outcome: BatchOutcome, out: Path, junit: Path | None = None) -> Path | None:
@@ -36,4 +38,5 @@ def write_outcome(outcome: BatchOutcome, out: Path, junit: Path | None = None) -
     append_step_summary(outcome, os.environ)
     if not outcome.runs:
         return None
-    return write_summary(summarise(outcome.runs, outcome.vehicles, outcome.failures), out, outcome.gates)
+    summary = summarise(outcome.runs, outcome.vehicles, outcome.failures, out)
+    return write_summary(replace(summary, gates=outcome.gates), out)

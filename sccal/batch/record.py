@@ -23,7 +23,7 @@ from sccal.calibration.shared import SharedLikelihood
 from sccal.results.calibration import Calibration, Fixes, History, Provenance, Residuals, Trajectory
 
 RECORD_FILE = ".sccal.json"
-SCHEMA = "sccal.record/2"
+SCHEMA = "sccal.record/3"
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from sccal.batch.record import FileMark, RunRecord, key_of, light, record_from, 
 from sccal.batch.remote import RemoteRun, fetched
 from sccal.calibration.beside_small import judged_held_out, model_of_run, widened
 from sccal.calibration.by_the_others import SaidByOthers, windows_by_others
-from sccal.calibration.judged_model import check_vehicle, notices_on_vehicle
+from sccal.calibration.judged_model import check_vehicle, digest_of, notices_on_vehicle
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.shared import SharedLikelihood, own_answer
 from sccal.calibration.single import calibrate_run, prepare
@@ -34,7 +34,6 @@ from sccal.logs.inputs import input_files
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run
 from sccal.logs.streams import Run
-from sccal.report.model_json import digest_of
 from sccal.report.write import write_calibration
 from sccal.results.calibration import OutageWindow, Provenance
 from sccal.results.model import JudgedModel

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -40,6 +41,7 @@ from sccal.results.calibration import (
     Fit,
     Fixes,
     History,
+    Origin,
     Residuals,
     Trajectory,
 )
@@ -111,9 +113,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
                 vehicle=aligned.vehicle,
                 with_offset=options.filter.with_offset,
                 parameters=judge(values[:4], constants, aligned.vehicle, options.filter, drive),
-                origin_lat_deg=aligned.plane.lat_deg,
-                origin_lon_deg=aligned.plane.lon_deg,
-                origin_alt_m=aligned.plane.alt_m,
+                origin=Origin(aligned.plane.lat_deg, aligned.plane.lon_deg, aligned.plane.alt_m),
                 fit=measure_fit(problem, final),
                 outage=outage,
                 noise=problem.noise,
@@ -128,7 +128,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
                 on_the_way=_trajectory(honest),
                 against_reference=judged,
                 unseen=unseen_parameters(problem, values),
-                started_utc_s=_started_utc_s(aligned),
+                started=_started(aligned),
                 causes=find_causes(problem, final, values, start.moving_from_s + SETTLED_S),
                 consistency=consistency_over_time(problem, final),
                 manoeuvres=describe_manoeuvres(aligned, values),
@@ -139,15 +139,22 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
     )
 
 
-def _started_utc_s(aligned: Aligned) -> float | None:
+def _started(aligned: Aligned) -> str | None:
     """By the receiver's date or a logging clock that shows one; an era of GPS weeks too early is the receiver's."""
     start = aligned.span_s[0]
     own = start if EARLIEST_UTC_S < start < LATEST_UTC_S else None
     offset = aligned.clock.offset_at_start_s
     if offset is None or not EARLIEST_UTC_S < start - offset < LATEST_UTC_S:
-        return own
+        return None if own is None else utc_text(own)
     rolled_over = abs(offset) > DAY_S and abs(math.remainder(offset, ERA_S)) < DAY_S
-    return own if rolled_over else start - offset
+    if rolled_over:
+        return None if own is None else utc_text(own)
+    return utc_text(start - offset)
+
+
+def utc_text(utc_s: float) -> str:
+    """Unix time as ISO 8601 in UTC, to the second."""
+    return datetime.fromtimestamp(utc_s, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def _effects(problem: RunProblem, values: Floats, covariance: Floats) -> dict[str, dict[str, Estimate]]:

@@ -14,10 +14,10 @@ from sccal.results.calibration import (
     Estimate,
     Fit,
     Missing,
-    Noise,
     Parameters,
     VehicleCalibration,
 )
+from sccal.results.noise import Noise
 from sccal.results.numbers import short
 from sccal.results.verdict import Verdict
 

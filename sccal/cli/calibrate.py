@@ -103,15 +103,15 @@ def calibrate(
     import numpy as np
 
     from sccal.batch import AlsoWritten, calibrate_paths, judged, write_outcome
+    from sccal.calibration.judged_model import read_judged_model
     from sccal.calibration.options import CalibrationOptions
     from sccal.filter.options import FilterOptions
     from sccal.gates.asked import read_asked
     from sccal.logs.windows import parse_window
-    from sccal.report.model_json import read_model
 
     lines = sys.stderr if as_json else sys.stdout
     try:
-        judged_model = None if model is None else read_model(model)
+        judged_model = None if model is None else read_judged_model(model)
         options = CalibrationOptions(
             filter=FilterOptions(
                 with_offset=not no_offset,
@@ -153,12 +153,11 @@ def calibrate(
         _tell_batch(batch, out, index)
         _tell_gates(outcome)
     if as_json:
-        from sccal.report.as_json import json_text
-        from sccal.report.batch_json import batch_json
+        from sccal.results.converter import document_of, json_text
 
-        print(json_text(batch_json(outcome)), end="")
+        print(json_text(document_of(outcome)), end="")
     with redirect_stdout(lines):
-        tell_failures(batch.failures, len(batch.failures) + len(batch.calibrated))
+        tell_failures(batch.failures, len(batch.failures) + len(batch.runs))
     raise typer.Exit(int(outcome.exit_code))
 
 
@@ -190,7 +189,7 @@ def _tell_batch(batch: Batch, out: Path, index: Path | None) -> None:
     from sccal.report.text import run_text, vehicle_text
 
     if batch.unchanged:
-        print(f"{batch.unchanged} of {len(batch.calibrated)} results stood already and were not made again")
+        print(f"{batch.unchanged} of {len(batch.runs)} results stood already and were not made again")
     for vehicle, file in batch.vehicles:
         print()
         alone = len(vehicle.runs) == 1
@@ -198,7 +197,7 @@ def _tell_batch(batch: Batch, out: Path, index: Path | None) -> None:
         print()
         page = out / vehicle.runs[0].run / "report.html" if alone else file.with_suffix(".html")
         print(f"results in {out}/, report: {page}")
-    if index is not None and len(batch.calibrated) + len(batch.failures) > 1:
+    if index is not None and len(batch.runs) + len(batch.failures) > 1:
         print(f"all runs: {index}")
 
 

@@ -27,10 +27,9 @@ def compare(
 
     comparison = compare_paths(a, b, sigmas)
     if as_json:
-        from sccal.report.as_json import json_text
-        from sccal.report.compare_json import compare_json
+        from sccal.results.converter import document_of, json_text
 
-        print(json_text(compare_json(comparison)), end="")
+        print(json_text(document_of(comparison)), end="")
     else:
         from sccal.report.compare_text import compare_text
 

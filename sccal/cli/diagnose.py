@@ -32,7 +32,7 @@ def diagnose(
     from sccal.batch import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.report.diagnosis_text import diagnosis_text, next_line
-    from sccal.results.saved_model import MODEL_FILE
+    from sccal.results.files import MODEL_FILE
 
     options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
     diagnosed, failures = diagnose_paths(paths, out, options, read)

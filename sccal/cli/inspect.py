@@ -29,14 +29,14 @@ def inspect_(
 ) -> None:
     """What is in the logs below PATHS before anything is estimated, and what their drives can show."""
     from sccal.batch import inspect_paths
-    from sccal.report.as_json import json_text
-    from sccal.report.inspect_json import inspections_json
     from sccal.report.inspect_text import inspection_text
+    from sccal.results.converter import document_of, json_text
+    from sccal.results.inspection import InspectFailure, Inspections
 
     inspected, failures = inspect_paths(paths, out, read)
     if as_json:
-        failed = [(failure.name, str(failure.error)) for failure in failures]
-        print(json_text(inspections_json([one for one, _ in inspected], failed)), end="")
+        failed = tuple(InspectFailure(one.name, str(one.error)) for one in failures)
+        print(json_text(document_of(Inspections(tuple(one for one, _ in inspected), failed))), end="")
     else:
         for number, (one, page) in enumerate(inspected):
             print(("\n" if number else "") + inspection_text(one, columns()), end="")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
-from sccal.compare.pairs import pairs_of
+from sccal.compare.pairs import figure_of, pairs_of
 from sccal.logs.names import VEHICLE_FILE
+from sccal.results.calibration import Calibrated, VehicleCalibration
 from sccal.results.comparison import Comparison, Figure, Side
-from sccal.results.saved import Saved
+from sccal.results.converter import document_of
 
 FIGURES = (
     "fit.gnss_innovation_rms_m",
@@ -25,9 +25,12 @@ NOT_DATA = (VEHICLE_FILE,)
 """Inputs that results may share and still be of different data."""
 
 
-def compare_calibrations(a: Saved, b: Saved, sigmas: float) -> Comparison:
-    """What changed from A to B by more than ``sigmas`` of the difference's sigma."""
+def compare_calibrations(
+    a: Calibrated, b: Calibrated, sigmas: float, paths: tuple[str, str] = ("A", "B")
+) -> Comparison:
+    """What changed from A to B by more than ``sigmas`` of the difference's sigma; ``paths`` are their files."""
     effects_a, effects_b = a.effects, b.effects
+    document_a, document_b = document_of(a), document_of(b)
     effects = (
         pair
         for effect in dict.fromkeys((*effects_a, *effects_b))
@@ -35,43 +38,41 @@ def compare_calibrations(a: Saved, b: Saved, sigmas: float) -> Comparison:
     )
     return Comparison(
         "calibration",
-        _side(a),
-        _side(b),
+        _side(a, paths[0]),
+        _side(b, paths[1]),
         sigmas,
-        (*pairs_of("parameters", a.parameters, b.parameters, sigmas), *effects),
-        tuple(Figure(name, _figure(a, name), _figure(b, name)) for name in FIGURES),
+        (*pairs_of("parameters", a.parameters.by_key, b.parameters.by_key, sigmas), *effects),
+        tuple(Figure(name, figure_of(document_a, name), figure_of(document_b, name)) for name in FIGURES),
         (),
         tuple(_remarks(a, b)),
     )
 
 
-def _side(saved: Saved) -> Side:
-    what = f"vehicle {saved.vehicle}" if saved.of_vehicle else f"run {saved.run} of {saved.vehicle}"
-    started = saved.document.get("started")
-    return Side(str(saved.path), f"{what}, {started}" if started else what, saved.verdict)
+def _side(result: Calibrated, path: str) -> Side:
+    vehicle = result.vehicle.name
+    what = f"vehicle {vehicle}" if result.of_vehicle else f"run {result.run} of {vehicle}"
+    return Side(path, f"{what}, {result.started}" if result.started else what, str(result.verdict))
 
 
-def _figure(saved: Saved, name: str) -> float | None:
-    block, _, key = name.partition(".")
-    value = (saved.document.get(block) or {}).get(key)
-    return float(value) if isinstance(value, int | float) else None
-
-
-def _remarks(a: Saved, b: Saved) -> Iterator[str]:
-    if a.vehicle != b.vehicle:
-        yield f"two vehicles: {a.vehicle} and {b.vehicle}"
+def _remarks(a: Calibrated, b: Calibrated) -> Iterator[str]:
+    if a.vehicle.name != b.vehicle.name:
+        yield f"two vehicles: {a.vehicle.name} and {b.vehicle.name}"
     yield from _shared(a, b)
-    if a.document.get("variant") != b.document.get("variant"):
-        yield f"variants differ: {a.document.get('variant')} and {b.document.get('variant')}"
-    for block, title in (("options", "options"), ("versions", "versions")):
-        told_a, told_b = _provenance(a).get(block), _provenance(b).get(block)
+    if a.variant != b.variant:
+        yield f"variants differ: {a.variant} and {b.variant}"
+    if a.provenance is None or b.provenance is None:
+        return
+    for title, told_a, told_b in (
+        ("options", a.provenance.options, b.provenance.options),
+        ("versions", a.provenance.versions, b.provenance.versions),
+    ):
         if told_a and told_b and told_a != told_b:
             keys = [key for key in dict.fromkeys((*told_a, *told_b)) if told_a.get(key) != told_b.get(key)]
             each = (f"{key} {told_a.get(key, 'not told')} and {told_b.get(key, 'not told')}" for key in keys)
             yield f"{title} differ: {', '.join(each)}"
 
 
-def _shared(a: Saved, b: Saved) -> Iterator[str]:
+def _shared(a: Calibrated, b: Calibrated) -> Iterator[str]:
     """Whether the two share data, so far as they tell: then the sigma of the difference does not hold."""
     alike = "their errors are alike, so that the sigmas of the differences, which suppose other data, are too large"
     data_a, data_b = _data(a), _data(b)
@@ -86,31 +87,22 @@ def _shared(a: Saved, b: Saved) -> Iterator[str]:
         yield "whether A and B share data is not told in their files; the sigmas of the differences suppose other data"
 
 
-def _begin_apart(a: Saved, b: Saved) -> bool:
-    begun = (a.document.get("started"), b.document.get("started"))
-    return None not in begun and begun[0] != begun[1]
+def _begin_apart(a: Calibrated, b: Calibrated) -> bool:
+    return a.started is not None and b.started is not None and a.started != b.started
 
 
-def _shared_by_name(a: Saved, b: Saved) -> str:
-    if a.vehicle != b.vehicle:
+def _shared_by_name(a: Calibrated, b: Calibrated) -> str:
+    if a.vehicle.name != b.vehicle.name:
         return ""
     common = [run for run in _runs(a) if run in _runs(b)]
     return "" if not common else f"the run {common[0]}" if len(common) == 1 else f"{len(common)} runs"
 
 
-def _runs(saved: Saved) -> list[str]:
-    return [str(one["run"]) for one in saved.document.get("runs", [])] if saved.of_vehicle else [saved.run]
+def _runs(result: Calibrated) -> list[str]:
+    return [one.run for one in result.runs] if isinstance(result, VehicleCalibration) else [result.run]
 
 
-def _data(saved: Saved) -> set[str]:
+def _data(result: Calibrated) -> set[str]:
     """Hashes of the files that hold measurements."""
-    return {
-        str(one["sha256"])
-        for one in _provenance(saved).get("inputs", [])
-        if str(one["name"]).rpartition("/")[2] not in NOT_DATA
-    }
-
-
-def _provenance(saved: Saved) -> Mapping[str, Any]:
-    told = saved.document.get("provenance")
-    return told if isinstance(told, dict) else {}
+    inputs = () if result.provenance is None else result.provenance.inputs
+    return {one.sha256 for one in inputs if one.name.rpartition("/")[2] not in NOT_DATA}

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
-from sccal.compare.pairs import pairs_of
+from sccal.compare.pairs import figure_of, pairs_of
+from sccal.results.calibration import Estimate
 from sccal.results.comparison import Comparison, Figure, FoundEffect, Side
-from sccal.results.saved import SavedEstimate
-from sccal.results.saved_diagnosis import SavedDiagnosis
+from sccal.results.converter import document_of
+from sccal.results.diagnosis import Diagnosis, Finding
 
 FIGURES = (
     "outage_rms_m",
@@ -19,9 +21,10 @@ FIGURES = (
 )
 
 
-def compare_diagnoses(a: SavedDiagnosis, b: SavedDiagnosis, sigmas: float) -> Comparison:
+def compare_diagnoses(a: Diagnosis, b: Diagnosis, sigmas: float, paths: tuple[str, str] = ("A", "B")) -> Comparison:
     """What changed from A to B; the parameters of an effect are compared where both found it."""
-    found_a, found_b = a.findings, b.findings
+    found_a, found_b = by_effect(a), by_effect(b)
+    document_a, document_b = document_of(a), document_of(b)
     kept = (
         pair
         for effect in found_a
@@ -30,12 +33,12 @@ def compare_diagnoses(a: SavedDiagnosis, b: SavedDiagnosis, sigmas: float) -> Co
     )
     return Comparison(
         "diagnosis",
-        _side(a),
-        _side(b),
+        _side(a, paths[0]),
+        _side(b, paths[1]),
         sigmas,
-        (*pairs_of("parameters", a.parameters_after, b.parameters_after, sigmas), *kept),
+        (*pairs_of("parameters", _constants(a), _constants(b), sigmas), *kept),
         tuple(
-            Figure(f"{when}.{name}", a.judged(when).get(name), b.judged(when).get(name))
+            Figure(f"{when}.{name}", figure_of(document_a, f"{when}.{name}"), figure_of(document_b, f"{when}.{name}"))
             for name in FIGURES
             for when in ("before", "after")
         ),
@@ -44,8 +47,8 @@ def compare_diagnoses(a: SavedDiagnosis, b: SavedDiagnosis, sigmas: float) -> Co
     )
 
 
-def _found(effect: str, a: SavedDiagnosis, b: SavedDiagnosis) -> FoundEffect:
-    in_a, in_b = a.findings.get(effect), b.findings.get(effect)
+def _found(effect: str, a: Diagnosis, b: Diagnosis) -> FoundEffect:
+    in_a, in_b = by_effect(a).get(effect), by_effect(b).get(effect)
     change: Literal["gained", "lost", "kept"] = "kept"
     reason = ""
     if in_a is None and in_b is not None:
@@ -63,24 +66,20 @@ def _found(effect: str, a: SavedDiagnosis, b: SavedDiagnosis) -> FoundEffect:
     )
 
 
-def _why_absent(
-    effect: str, there: Mapping[str, SavedEstimate], side: str, having: SavedDiagnosis, lacking: SavedDiagnosis
-) -> str:
+def _why_absent(effect: str, there: Mapping[str, Estimate], side: str, having: Diagnosis, lacking: Diagnosis) -> str:
     """What the diagnosis that lacks the effect says of it."""
-    document = lacking.document
-    if taken := (document.get("taken_back") or {}).get(effect):
+    if taken := lacking.taken_back.get(effect):
         return f"{side} took it back: {taken}"
-    rivals = having.findings[effect].indistinguishable_from
-    for other, finding in lacking.findings.items():
+    rivals = by_effect(having)[effect].indistinguishable_from
+    for other, finding in by_effect(lacking).items():
         if effect in finding.indistinguishable_from or other in rivals:
             return f"{side} has {other}, which could as well be this"
-    for one in document.get("not_excited", []):
-        if one.get("effect") == effect:
-            return f"{side} could not have shown it: {one.get('advice', 'not excited')}"
-    for one in document.get("detectable", []):
-        if one.get("effect") == effect:
-            smallest: Mapping[str, float | None] = one.get("smallest") or {}
-            sizes = [(key, size) for key, size in smallest.items() if size is not None and key in there]
+    for hidden in lacking.not_excited:
+        if hidden.name == effect:
+            return f"{side} could not have shown it: {hidden.advice}"
+    for one in lacking.detectable:
+        if one.name == effect:
+            sizes = [(key, size) for key, size in one.smallest.items() if math.isfinite(size) and key in there]
             if any(abs(there[key].value) >= size for key, size in sizes):
                 return f"{side} would have found it at this size"
             if sizes:
@@ -89,14 +88,14 @@ def _why_absent(
     return ""
 
 
-def _side(saved: SavedDiagnosis) -> Side:
-    runs = f"{len(saved.runs)} run{'' if len(saved.runs) == 1 else 's'}"
-    return Side(str(saved.path), f"{runs} of {saved.vehicle}" if saved.vehicle else runs, "")
+def _side(diagnosis: Diagnosis, path: str) -> Side:
+    runs = f"{len(diagnosis.runs)} run{'' if len(diagnosis.runs) == 1 else 's'}"
+    return Side(path, f"{runs} of {diagnosis.vehicle.name}" if diagnosis.vehicle.name else runs, "")
 
 
-def _remarks(a: SavedDiagnosis, b: SavedDiagnosis) -> Iterator[str]:
-    if a.vehicle != b.vehicle:
-        yield f"two vehicles: {a.vehicle or 'not told'} and {b.vehicle or 'not told'}"
+def _remarks(a: Diagnosis, b: Diagnosis) -> Iterator[str]:
+    if a.vehicle.name != b.vehicle.name:
+        yield f"two vehicles: {a.vehicle.name or 'not told'} and {b.vehicle.name or 'not told'}"
     common = [run for run in a.runs if run in b.runs]
     if common:
         yield (
@@ -108,8 +107,17 @@ def _remarks(a: SavedDiagnosis, b: SavedDiagnosis) -> Iterator[str]:
         yield f"left without a name: {left_a} in A, {left_b} in B"
 
 
-def _unexplained(saved: SavedDiagnosis) -> str:
-    left = saved.document.get("unexplained") or {}
-    if not left.get("significant"):
-        return "nothing"
-    return f"{left.get('port')} following {left.get('depends_on')}"
+def _constants(diagnosis: Diagnosis) -> dict[str, Estimate]:
+    """The constants with the findings in the model, as far as the file tells them."""
+    known = diagnosis.parameters_after.by_key
+    return {key: one for key, one in known.items() if not (math.isnan(one.value) and math.isnan(one.sigma))}
+
+
+def _unexplained(diagnosis: Diagnosis) -> str:
+    left = diagnosis.unexplained
+    return f"{left.port} following {left.depends_on}" if left.significant else "nothing"
+
+
+def by_effect(diagnosis: Diagnosis) -> dict[str, Finding]:
+    """The findings by their effects, in the order in which they were added."""
+    return {one.name: one for one in diagnosis.findings}

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from sccal.results.calibration import Estimate
 from sccal.results.comparison import Change, Pair
+from sccal.results.converter import Json
 from sccal.results.differences import difference, why_not_estimated, why_own_log_only
-from sccal.results.saved import SavedEstimate
 
 
-def pairs_of(
-    prefix: str, a: Mapping[str, SavedEstimate], b: Mapping[str, SavedEstimate], sigmas: float
-) -> tuple[Pair, ...]:
+def pairs_of(prefix: str, a: Mapping[str, Estimate], b: Mapping[str, Estimate], sigmas: float) -> tuple[Pair, ...]:
     """Every parameter of either, those of A first; ``prefix`` is ``parameters`` or ``effects.NAME``."""
     keys = tuple(dict.fromkeys((*a, *b)))
     return tuple(
@@ -20,7 +19,7 @@ def pairs_of(
     )
 
 
-def _pair(name: str, key: str, a: SavedEstimate | None, b: SavedEstimate | None, own: str, sigmas: float) -> Pair:
+def _pair(name: str, key: str, a: Estimate | None, b: Estimate | None, own: str, sigmas: float) -> Pair:
     if a is None or b is None:
         return Pair(name, a, b, None, "not comparable", f"only {'B' if a is None else 'A'} has it")
     reasons = [f"{side}: {why}" for side, one in (("A", a), ("B", b)) if (why := why_not_estimated(one))]
@@ -31,3 +30,10 @@ def _pair(name: str, key: str, a: SavedEstimate | None, b: SavedEstimate | None,
         return Pair(name, a, b, None, "not comparable", "no sigma to judge by")
     change: Change = "changed" if abs(d.amount) > sigmas * d.sigma else "unchanged"
     return Pair(name, a, b, d, change, "")
+
+
+def figure_of(document: Json, name: str) -> float | None:
+    """A number by its dotted name in a document; None where it is not there."""
+    block, _, key = name.partition(".")
+    value = (document[block] or {}).get(key)
+    return float(value) if isinstance(value, int | float) else None

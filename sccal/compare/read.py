@@ -7,12 +7,13 @@ from pathlib import Path
 from sccal.compare.calibrations import compare_calibrations
 from sccal.compare.diagnoses import compare_diagnoses
 from sccal.errors import DataError, UsageError
+from sccal.results.calibration import CALIBRATION_SCHEMA
 from sccal.results.comparison import Comparison, Kind
-from sccal.results.document import read_document
-from sccal.results.saved import RESULT_FILE, SCHEMA, VEHICLE_FILE, read_saved
-from sccal.results.saved_diagnosis import DIAGNOSIS_FILE, DIAGNOSIS_SCHEMA, read_diagnosis
+from sccal.results.converter import read_json
+from sccal.results.diagnosis import Diagnosis
+from sccal.results.files import DIAGNOSIS_FILE, RESULT_FILE, VEHICLE_FILE, read_calibration, read_diagnosis
 
-KINDS: dict[str, Kind] = {SCHEMA: "calibration", DIAGNOSIS_SCHEMA: "diagnosis"}
+KINDS: dict[str, Kind] = {CALIBRATION_SCHEMA: "calibration", Diagnosis.SCHEMA: "diagnosis"}
 """By schema."""
 
 
@@ -36,9 +37,10 @@ def compare_paths(a: Path, b: Path, sigmas: float) -> Comparison:
             f"or {there_a['diagnosis']}"
         )
     file_a, file_b = there_a[common[0]], there_b[common[0]]
+    names = str(file_a), str(file_b)
     if common[0] == "calibration":
-        return compare_calibrations(read_saved(file_a), read_saved(file_b), sigmas)
-    return compare_diagnoses(read_diagnosis(file_a), read_diagnosis(file_b), sigmas)
+        return compare_calibrations(read_calibration(file_a), read_calibration(file_b), sigmas, names)
+    return compare_diagnoses(read_diagnosis(file_a), read_diagnosis(file_b), sigmas, names)
 
 
 def _results_at(path: Path) -> dict[Kind, Path]:
@@ -58,7 +60,7 @@ def _results_at(path: Path) -> dict[Kind, Path]:
             names = f"{RESULT_FILE}, {VEHICLE_FILE} or {DIAGNOSIS_FILE}"
             raise UsageError(f"{path}: holds no {names}; name a file, or the folder of one run's results, as OUT/run")
         return there
-    _, schema = read_document(path)
+    _, schema = read_json(path)
     if schema is None or schema not in KINDS:
         raise DataError(f"{path}: its schema is {schema!r}; compare files of {' or of '.join(KINDS)}")
     return {KINDS[schema]: path}

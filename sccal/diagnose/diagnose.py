@@ -41,9 +41,8 @@ from sccal.results.diagnosis import (
     Judgement,
     Placebo,
     Ranked,
-    RunNoise,
 )
-from sccal.results.model import JudgedEffect, JudgedModel
+from sccal.results.model import JudgedEffect, JudgedModel, RunNoise
 
 BOOTSTRAP = 400
 RANKED = 8

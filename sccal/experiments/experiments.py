@@ -15,11 +15,12 @@ from sccal.align import align
 from sccal.arrays import Floats
 from sccal.calibration.single import calibrate_run
 from sccal.errors import SccalError
-from sccal.experiments.plan import EXPERIMENTS, PATHS, TOLERANCE_PERCENT, robot
+from sccal.experiments.plan import EXPERIMENTS, PATHS, robot
 from sccal.experiments.trial import default_options, measured_truth, simulated_trials, try_run
 from sccal.logs.run import RunSource, read_run
 from sccal.results.calibration import Parameters
 from sccal.results.experiments import (
+    TOLERANCE_PERCENT,
     VARIANTS,
     Cell,
     Experiment,

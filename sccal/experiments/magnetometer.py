@@ -9,11 +9,11 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.randomness import gauss_markov, random_stream
+from sccal.results.experiments import MAGNETOMETER_WANDER
 from sccal.simulate.physics import Physics
 from sccal.simulate.world import State
 
-WANDER_DEG = 3.0
-WANDER_TIME_S = 60.0
+WANDER_DEG, WANDER_TIME_S = MAGNETOMETER_WANDER.sigma_deg, MAGNETOMETER_WANDER.time_s
 _STEP_S = 1.0
 
 

@@ -22,8 +22,6 @@ from sccal.simulate.settings import (
 PATHS: tuple[PathName, ...] = ("rectangle", "circle", "general")
 FIXES_FIRST_S = 40.0
 """So long the noisy experiments begin with good fixes; at most a fifth of the run."""
-TOLERANCE_PERCENT = 1.0
-"""Of R_r, R_l and L, within which a trial counts as having found them."""
 LOSS = (0.5, 0.7)
 """Of the run: from where to where its fixes are lost."""
 

@@ -17,8 +17,7 @@ from sccal import __version__
 from sccal.export.estimates import usable, why_not, with_sigma
 from sccal.export.result import Result
 from sccal.logs.names import VEHICLE_FILE
-from sccal.results.numbers import one_line
-from sccal.results.saved import SavedEstimate
+from sccal.results.calibration import Estimate
 
 MOST_DELAY_MS = 250
 CERTAIN = 2.0
@@ -27,11 +26,11 @@ CERTAIN = 2.0
 
 def write_ardupilot(result: Result) -> str:
     """The parameters of one vehicle; what was not estimated stands as a comment, so that loading leaves it alone."""
-    parameters = result.saved.parameters
+    parameters = result.parameters
     track = parameters["track_m"]
     lines = [
         f"# {result.subject}",
-        f"# {one_line(result.saved.verdict)}",
+        f"# {result.verdict}",
         f"# Written by sccal {__version__}. X forward, Y right, metres from the middle between the wheels.",
         "# If the origin of your positions is elsewhere, add where that middle is to every _POS_X and _POS_Y.",
         "# WENC is the left wheel's encoder, WENC2 the right wheel's: exchange the two if yours are wired otherwise.",
@@ -40,14 +39,14 @@ def write_ardupilot(result: Result) -> str:
         *_line("WENC2_RADIUS", 1.0, "right radius", parameters["radius_right_m"]),
         *_line("WENC_POS_Y", -0.5, "minus half of the track,", track),
         *_line("WENC2_POS_Y", 0.5, "half of the track,", track),
-        *_antenna(result.saved.effects.get("lever_arm")),
-        *_delay(result.saved.effects.get("gnss_latency")),
+        *_antenna(result.effects.get("lever_arm")),
+        *_delay(result.effects.get("gnss_latency")),
         *_heading(parameters["heading_offset_deg"]),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _line(name: str, factor: float, what: str, estimate: SavedEstimate) -> list[str]:
+def _line(name: str, factor: float, what: str, estimate: Estimate) -> list[str]:
     """A comment and a line; only comments where the data gave no value. The value is factor times the estimate."""
     if usable(estimate):
         return [f"# {what} {with_sigma(estimate, 'm')}", f"{name},{factor * estimate.value + 0.0:.6f}"]
@@ -55,7 +54,7 @@ def _line(name: str, factor: float, what: str, estimate: SavedEstimate) -> list[
     return [f"# {name} left as it is:{nominal} {why_not(estimate)}"]
 
 
-def _antenna(lever_arm: Mapping[str, SavedEstimate] | None) -> list[str]:
+def _antenna(lever_arm: Mapping[str, Estimate] | None) -> list[str]:
     if lever_arm is None:
         return ["# The antenna's place was not estimated: GPS1_POS_X and GPS1_POS_Y are left as they are."]
     return [
@@ -65,7 +64,7 @@ def _antenna(lever_arm: Mapping[str, SavedEstimate] | None) -> list[str]:
     ]
 
 
-def _delay(latency: Mapping[str, SavedEstimate] | None) -> list[str]:
+def _delay(latency: Mapping[str, Estimate] | None) -> list[str]:
     """Whole milliseconds within what the parameter may hold, where 0 stands for the receiver's default."""
     if latency is None:
         return []
@@ -86,7 +85,7 @@ def _delay(latency: Mapping[str, SavedEstimate] | None) -> list[str]:
     ]
 
 
-def _heading(offset: SavedEstimate) -> list[str]:
+def _heading(offset: Estimate) -> list[str]:
     """A comment: which compass was logged, and whether with a declination, is not known here."""
     if not usable(offset):
         return [f"# Heading offset: {why_not(offset)}."]

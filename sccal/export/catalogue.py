@@ -15,7 +15,6 @@ from sccal.export.result import Result
 from sccal.export.robot_localization import write_robot_localization
 from sccal.export.ros2_control import write_ros2_control
 from sccal.export.tum import write_tum
-from sccal.results.numbers import one_line
 
 _GEOMETRY = ("radius_right_m", "radius_left_m", "track_m")
 
@@ -76,16 +75,16 @@ def format_named(name: str) -> Format:
 
 def left_out(chosen: Format, result: Result) -> list[str]:
     """What a reader of the file must not miss, a line each: a doubtful result, no value, no place in the format."""
-    saved, lines = result.saved, []
-    if saved.verdict.startswith("doubtful"):
-        lines.append(f"the result is {one_line(saved.verdict)}")
+    lines = []
+    if result.verdict.startswith("doubtful"):
+        lines.append(f"the result is {result.verdict}")
     lines += [
-        f"{key} is not set: {why_not(saved.parameters[key])}"
+        f"{key} is not set: {why_not(result.parameters[key])}"
         for key in chosen.parameters
-        if not usable(saved.parameters[key])
+        if not usable(result.parameters[key])
     ]
     if chosen.parameters:
-        for effect, named in saved.effects.items():
+        for effect, named in result.effects.items():
             if effect not in chosen.effects:
                 lines.append(f"{effect} was estimated too and is not written in this format")
             else:

@@ -21,7 +21,7 @@ def write_geojson(result: Result) -> str:
     lat_deg, lon_deg = result.lat_lon_deg
     positions = list(zip(lon_deg.tolist(), lat_deg.tolist(), strict=True))
     utc = result.utc
-    names = {"vehicle": result.saved.vehicle, "run": result.saved.run}
+    names = {"vehicle": result.vehicle, "run": result.name}
     features = []
     if len(positions) > 1:
         parts = cut_at_180(positions)

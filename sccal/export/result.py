@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -13,10 +14,19 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.geodesy import TangentPlane
-from sccal.results.document import read_document
-from sccal.results.numbers import one_line
-from sccal.results.saved import RESULT_FILE, VEHICLE_FILE, Saved, SavedTrajectory, read_saved, read_trajectory
-from sccal.results.saved_model import MODEL_FILE, MODEL_SCHEMA, read_saved_model
+from sccal.results.calibration import VEHICLE_RUN, Calibrated, Calibration, Estimate, Trajectory, VehicleCalibration
+from sccal.results.converter import read_json
+from sccal.results.files import (
+    MODEL_FILE,
+    RESULT_FILE,
+    VEHICLE_FILE,
+    calibration_file,
+    read_calibration,
+    read_model,
+    read_trajectory,
+)
+from sccal.results.model import JudgedModel
+from sccal.results.numbers import one_line, plain
 
 CLOCKS_AGREE_S = 60.0
 """Between the path's first time in UTC and the start that calibration.json tells, which has whole seconds and is that
@@ -25,32 +35,66 @@ of the wheels."""
 
 @dataclass(frozen=True)
 class Result:
-    """A calibration as it was written; its path is read when a format asks for it."""
+    """A calibration as it was written, or a model; its path is read when a format asks for it."""
 
-    saved: Saved
+    path: Path
+    """Of the JSON file."""
+    subject: str
+    """Vehicle and run, on one line, for titles and comments."""
+    vehicle: str
+    """Its name."""
+    verdict: str
+    """On one line; of a model how it was judged."""
+    parameters: Mapping[str, Estimate]
+    """By PARAMETERS, the heading offset in degrees."""
+    effects: Mapping[str, Mapping[str, Estimate]]
+    run: Calibration | None = None
+    """None for runs together, which have no path."""
+
+    @classmethod
+    def of(cls, result: Calibrated, path: Path) -> Result:
+        """Of a run's or a vehicle's calibration."""
+        what = f"{_count(len(result.runs))} together" if isinstance(result, VehicleCalibration) else f"run {result.run}"
+        return cls(
+            path,
+            one_line(f"vehicle {result.vehicle.name}, {what}"),
+            result.vehicle.name,
+            one_line(str(result.verdict)),
+            result.parameters.by_key,
+            result.effects,
+            result if isinstance(result, Calibration) else None,
+        )
+
+    @classmethod
+    def of_model(cls, model: JudgedModel, path: Path) -> Result:
+        """Of a model that a diagnosis judged; an effect of one run alone goes by the run's name too."""
+        drift = model.outage_end_rms_m
+        judged = "" if drift is None else f": drift without fixes, held out, {plain(drift, 2)} m rms"
+        return cls(
+            path,
+            one_line(f"vehicle {model.vehicle}, model of {_count(len(model.noises))}"),
+            model.vehicle,
+            f"model of a diagnosis{judged}",
+            model.parameters.by_key,
+            {f"{one.name} of run {one.run}" if one.run else one.name: one.parameters for one in model.effects},
+        )
 
     @property
-    def subject(self) -> str:
-        """Vehicle and run, on one line, for titles and comments."""
-        saved = self.saved
-        if saved.of_vehicle:
-            count = len(saved.document.get("runs", ()))
-            runs = f"{count} run{'' if count == 1 else 's'}"
-            what = f"model of {runs}" if saved.document["schema"] == MODEL_SCHEMA else f"{runs} together"
-            return one_line(f"vehicle {saved.vehicle}, {what}")
-        return one_line(f"vehicle {saved.vehicle}, run {saved.run}")
+    def name(self) -> str:
+        """The run's."""
+        return VEHICLE_RUN if self.run is None else self.run.run
 
     @cached_property
-    def trajectory(self) -> SavedTrajectory:
+    def trajectory(self) -> Trajectory:
         """The middle between the wheels in the tangent plane, each (n,), n > 0.
 
         Raises:
             UsageError: the result is that of a vehicle, or a model.
             DataError: trajectory.csv is missing, damaged or empty.
         """
-        if self.saved.of_vehicle:
-            raise UsageError(f"{self.saved.path}: runs together have no path; name the folder of one run, as OUT/run")
-        folder = self.saved.path.parent
+        if self.run is None:
+            raise UsageError(f"{self.path}: runs together have no path; name the folder of one run, as OUT/run")
+        folder = self.path.parent
         trajectory = read_trajectory(folder)
         if trajectory.t_s.size == 0:
             raise DataError(f"{folder}: its trajectory has no rows; calibrate again")
@@ -67,15 +111,12 @@ class Result:
         Raises:
             DataError: calibration.json has no origin.
         """
-        origin = self.saved.document.get("origin") or {}
-        try:
-            lat_deg, lon_deg = float(origin["lat_deg"]), float(origin["lon_deg"])
-            alt_m = float(origin.get("alt_m") or 0.0)
-        except (TypeError, KeyError, ValueError, AttributeError) as error:
-            raise DataError(f"{self.saved.path}: has no origin to place the path by; calibrate again") from error
-        if not (abs(lat_deg) <= 90.0 and math.isfinite(lon_deg) and math.isfinite(alt_m)):
-            raise DataError(f"{self.saved.path}: its origin, {lat_deg}, {lon_deg}, is no place on the earth")
-        return TangentPlane(lat_deg, lon_deg, alt_m)
+        if self.run is None or math.isnan(self.run.origin.lat_deg + self.run.origin.lon_deg):
+            raise DataError(f"{self.path}: has no origin to place the path by; calibrate again")
+        lat_deg, lon_deg = self.run.origin.lat_deg, self.run.origin.lon_deg
+        if not (abs(lat_deg) <= 90.0 and math.isfinite(lon_deg)):
+            raise DataError(f"{self.path}: its origin, {lat_deg}, {lon_deg}, is no place on the earth")
+        return TangentPlane(lat_deg, lon_deg, self.run.origin.alt_m)
 
     @cached_property
     def lat_lon_deg(self) -> tuple[Floats, Floats]:
@@ -87,13 +128,13 @@ class Result:
     @cached_property
     def utc(self) -> list[str] | None:
         """The path's times in UTC as ISO 8601 to the millisecond (n); None where the log has no date."""
-        started = self.saved.document.get("started")
-        if not isinstance(started, str):
+        started = None if self.run is None else self.run.started
+        if started is None:
             return None
         try:
             started_s = datetime.fromisoformat(started).timestamp()
         except ValueError as error:
-            raise DataError(f"{self.saved.path}: started {started!r} is no time; calibrate again") from error
+            raise DataError(f"{self.path}: started {started!r} is no time; calibrate again") from error
         milliseconds = np.round(1e3 * self._utc_s(started_s)).astype(np.int64).astype("datetime64[ms]")
         return [str(text) for text in np.datetime_as_string(milliseconds, timezone="UTC")]
 
@@ -101,8 +142,8 @@ class Result:
         """The logging clock minus its offset from UTC; from the start on where that does not lead to the start told."""
         t_s = self.trajectory.t_s
         since_start_s = t_s - t_s[0]
-        clock = self.saved.document.get("clock") or {}
-        offset_s, skew_ppm = clock.get("offset_at_start_s"), clock.get("skew_ppm") or 0.0
+        assert self.run is not None
+        offset_s, skew_ppm = self.run.clock.offset_at_start_s, self.run.clock.skew_ppm
         if offset_s is not None and abs(t_s[0] - offset_s - started_s) < CLOCKS_AGREE_S:
             return np.asarray(t_s - offset_s - 1e-6 * skew_ppm * since_start_s)
         if abs(t_s[0] - started_s) < CLOCKS_AGREE_S:
@@ -119,9 +160,14 @@ def read_result(path: Path) -> Result:
     """
     if path.is_dir() and not any((path / name).is_file() for name in (RESULT_FILE, VEHICLE_FILE)):
         path = path / MODEL_FILE if (path / MODEL_FILE).is_file() else path
-    if path.is_file() and read_document(path)[1] == MODEL_SCHEMA:
-        return Result(read_saved_model(path))
-    return Result(read_saved(path))
+    path = calibration_file(path)
+    if read_json(path)[1] == JudgedModel.SCHEMA:
+        return Result.of_model(read_model(path), path)
+    return Result.of(read_calibration(path), path)
+
+
+def _count(runs: int) -> str:
+    return f"{runs} run{'' if runs == 1 else 's'}"
 
 
 def wrapped_lon_deg(lon_deg: Floats) -> Floats:

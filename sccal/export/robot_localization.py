@@ -21,8 +21,7 @@ from sccal.export.estimates import usable, why_not, with_sigma
 from sccal.export.result import Result
 from sccal.export.ros2_control import ros_double
 from sccal.logs.names import VEHICLE_FILE
-from sccal.results.numbers import one_line
-from sccal.results.saved import SavedEstimate
+from sccal.results.calibration import Estimate
 
 _EKF = """\
 # Topics and frames are placeholders. Node names must be those of your launch file.
@@ -54,13 +53,12 @@ ekf_filter_node:
 
 def write_robot_localization(result: Result) -> str:
     """A snippet for both nodes, and the antenna's static transform as a comment."""
-    saved = result.saved
     return "\n".join(
         [
             f"# {result.subject}",
-            f"# {one_line(saved.verdict)}",
+            f"# {result.verdict}",
             f"# Written by sccal {__version__}.",
-            *(f"# {line}" for line in _antenna(saved.effects.get("lever_arm"))),
+            *(f"# {line}" for line in _antenna(result.effects.get("lever_arm"))),
             _EKF.rstrip("\n"),
             "navsat_transform_node:",
             "  ros__parameters:",
@@ -69,7 +67,7 @@ def write_robot_localization(result: Result) -> str:
             "    # Heading used = imu yaw + magnetic_declination_radians + yaw_offset, counter-clockwise from east.",
             f'    # The IMU message must be enu, as ROS asks: where {VEHICLE_FILE} says convention = "ned", or the',
             "    # heading is a receiver's (HDT and the like), the driver has to publish 90 deg - yaw.",
-            *_offset(saved.parameters["heading_offset_deg"]),
+            *_offset(result.parameters["heading_offset_deg"]),
             "    zero_altitude: true",
             "    publish_filtered_gps: true",
             "    use_odometry_yaw: false",
@@ -79,7 +77,7 @@ def write_robot_localization(result: Result) -> str:
     )
 
 
-def _offset(offset: SavedEstimate) -> list[str]:
+def _offset(offset: Estimate) -> list[str]:
     if not usable(offset):
         return [
             "    magnetic_declination_radians: 0.0  # of a magnetic AHRS: minus what maps give, which is positive east",
@@ -93,7 +91,7 @@ def _offset(offset: SavedEstimate) -> list[str]:
     ]
 
 
-def _antenna(lever_arm: Mapping[str, SavedEstimate] | None) -> list[str]:
+def _antenna(lever_arm: Mapping[str, Estimate] | None) -> list[str]:
     if lever_arm is None:
         return ["The antenna's place was not estimated; give base_link -> gps by your own static transform."]
     said, shift = [], {}

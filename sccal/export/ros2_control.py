@@ -12,19 +12,18 @@ import math
 from sccal import __version__
 from sccal.export.estimates import usable, why_not, with_sigma
 from sccal.export.result import Result
-from sccal.results.numbers import one_line
-from sccal.results.saved import SavedEstimate
+from sccal.results.calibration import Estimate
 
 
 def write_ros2_control(result: Result) -> str:
     """The same text as the ``ros2_control.yaml`` of the run or vehicle."""
-    parameters = result.saved.parameters
+    parameters = result.parameters
     right, left, track = (parameters[key] for key in ("radius_right_m", "radius_left_m", "track_m"))
     radius = left.nominal if left.nominal is not None else right.nominal
     return "\n".join(
         [
             f"# {result.subject}",
-            f"# {one_line(result.saved.verdict)}",
+            f"# {result.verdict}",
             f"# Written by sccal {__version__}. Nominal values are kept; the multipliers carry the calibration.",
             "diff_drive_controller:",
             "  ros__parameters:",
@@ -38,7 +37,7 @@ def write_ros2_control(result: Result) -> str:
     )
 
 
-def _multiplier(name: str, estimate: SavedEstimate) -> str:
+def _multiplier(name: str, estimate: Estimate) -> str:
     nominal = estimate.nominal
     if usable(estimate) and nominal is not None and nominal > 0.0:
         return f"    {name}: {ros_double(estimate.value / nominal)}  # {with_sigma(estimate, 'm')}"

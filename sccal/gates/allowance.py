@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sccal.errors import UsageError
+from sccal.results.calibration import Estimate
 from sccal.results.differences import Difference, unit_of
-from sccal.results.saved import SavedEstimate
 
 UNITS: Mapping[str, tuple[str, float]] = {
     "mm": ("m", 1e-3),
@@ -46,7 +46,7 @@ class Allowance:
             return f"--allow-drift {self.text} does not judge it; give an amount in {unit or 'sigmas'} too"
         return ""
 
-    def largest(self, before: SavedEstimate, d: Difference) -> float:
+    def largest(self, before: Estimate, d: Difference) -> float:
         """The largest difference allowed, in the parameter's unit; NaN where it cannot be told."""
         if self.unit == "sigma":
             return self.amount * d.sigma

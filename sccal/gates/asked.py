@@ -11,8 +11,8 @@ from sccal.gates.allowance import Allowance, parse_allowance
 from sccal.gates.baseline import Baseline, judge_drift, read_baseline
 from sccal.gates.expression import Gate, parse_gates, require_effects
 from sccal.gates.judge import judge
+from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.gates import GateResult
-from sccal.results.saved import Saved
 
 DEFAULT_DRIFT = "3sigma"
 """Allowed where a baseline is given and no --allow-drift."""
@@ -26,7 +26,7 @@ class Asked:
     baseline: Baseline | None
     allowances: tuple[Allowance, ...]
 
-    def judge(self, runs: Sequence[Saved], vehicles: Sequence[Saved]) -> tuple[GateResult, ...]:
+    def judge(self, runs: Sequence[Calibration], vehicles: Sequence[VehicleCalibration]) -> tuple[GateResult, ...]:
         """Gates first, then the drift of the runs, then of the vehicles.
 
         Raises:

@@ -9,27 +9,25 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_origin
 
+from sccal.results.calibration import PARAMETERS, Estimate, Fit, HeldOut, Outage
+from sccal.results.converter import Json, entries_of
 from sccal.results.numbers import listed
-from sccal.results.saved import PARAMETERS, Json
 
-FIELDS = ("value", "sigma", "status", "reason", "nominal", "prior_sigma")
+
+def _single(kind: type) -> tuple[str, ...]:
+    """What a type's document holds in one value each."""
+    lists = (tuple, Mapping)
+    return tuple(one.key for one in entries_of(kind) if get_origin(one.kind) not in lists)
+
+
+FIELDS = _single(Estimate)
 """Of every parameter, the four of the model and those of effects."""
 FIXED: Mapping[str, tuple[str, ...]] = {
-    "fit": (
-        "gnss_innovation_rms_m",
-        "heading_innovation_rms_deg",
-        "nis_gnss",
-        "nis_heading",
-        "fixes_used",
-        "fixes_rejected",
-        "headings_used",
-        "headings_rejected",
-        "recoveries",
-    ),
-    "outage": ("window_s", "windows", "rms_m", "end_rms_m", "percent_of_distance", "how"),
-    "held_out": ("outage_rms_m", "outage_end_rms_m", "how"),
+    "fit": _single(Fit),
+    "outage": _single(Outage),
+    "held_out": _single(HeldOut),
     "parameters": tuple(f"{key}{field}" for key in PARAMETERS for field in ("", *(f".{field}" for field in FIELDS))),
 }
 """Blocks whose names are known before any document is there."""

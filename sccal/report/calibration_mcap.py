@@ -13,8 +13,8 @@ from sccal.arrays import Bools, Floats
 from sccal.geodesy import TangentPlane
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY
 from sccal.logs.messages.write import Stamped, encoded, nanoseconds_of, write_topics
-from sccal.report.as_json import calibration_json, json_text
 from sccal.results.calibration import Calibration, Trajectory
+from sccal.results.converter import document_of, json_text
 
 MAP_FRAME, ROBOT_FRAME = "map", "base_link"
 
@@ -31,12 +31,12 @@ def write_calibration_mcap(c: Calibration, path: Path) -> None:
     metadata = {
         "run": c.run,
         "vehicle": c.vehicle.name,
-        "origin_lat_deg": repr(c.origin_lat_deg),
-        "origin_lon_deg": repr(c.origin_lon_deg),
-        "origin_alt_m": repr(c.origin_alt_m),
+        "origin_lat_deg": repr(c.origin.lat_deg),
+        "origin_lon_deg": repr(c.origin.lon_deg),
+        "origin_alt_m": repr(c.origin.alt_m),
         "log_ahead_ns": str(ahead_ns),
     }
-    attached = {"calibration.json": ("application/json", json_text(calibration_json(c)).encode())}
+    attached = {"calibration.json": ("application/json", json_text(document_of(c)).encode())}
     write_topics(path, topics, {"sccal.calibration": metadata}, attached, library=RESULT_LIBRARY)
 
 
@@ -83,13 +83,13 @@ def _odometry(topic: str, trajectory: Trajectory) -> Stamped:
 def _positions(c: Calibration) -> Stamped:
     """The same path as latitude and longitude, for a map."""
     trajectory = c.trajectory
-    plane = TangentPlane(c.origin_lat_deg, c.origin_lon_deg, c.origin_alt_m)
+    plane = TangentPlane(c.origin.lat_deg, c.origin.lon_deg, c.origin.alt_m)
     lat_deg, lon_deg = plane.to_lat_lon(trajectory.east_m, trajectory.north_m)
     n = trajectory.t_s.size
     numbers = {
         "latitude": lat_deg,
         "longitude": lon_deg,
-        "altitude": np.full(n, c.origin_alt_m),
+        "altitude": np.full(n, c.origin.alt_m),
         "position_covariance[0]": trajectory.sigma_east_m**2,
         "position_covariance[4]": trajectory.sigma_north_m**2,
         "position_covariance_type": np.full(n, 2.0),

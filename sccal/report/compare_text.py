@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from sccal.report.text import in_columns, labelled, wrapped
+from sccal.results.calibration import Estimate
 from sccal.results.comparison import Comparison, Figure, FoundEffect, Pair, Side
 from sccal.results.differences import unit_of
 from sccal.results.numbers import one_line, plain, short, value_and_sigma
-from sccal.results.saved import SavedEstimate
 
 LABELS = {
     "parameters.radius_right_m": "right radius mm",
@@ -117,7 +117,7 @@ def _scale(name: str) -> float:
     return 1e3 if name in LABELS and name.endswith("_m") else 1.0
 
 
-def _estimate(estimate: SavedEstimate | None, scale: float) -> str:
+def _estimate(estimate: Estimate | None, scale: float) -> str:
     if estimate is None or estimate.status == "unobserved":
         return NONE
     value, sigma = value_and_sigma(scale * estimate.value, scale * estimate.sigma)

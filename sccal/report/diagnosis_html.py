@@ -27,9 +27,10 @@ from sccal.report.html import page
 from sccal.report.rows import Row, parameter_rows
 from sccal.report.summary import warnings_first
 from sccal.report.text import sentence, shortened
-from sccal.results.diagnosis import Diagnosis, Finding, RunNoise
+from sccal.results.diagnosis import Diagnosis, Finding
+from sccal.results.files import MODEL_FILE
+from sccal.results.model import RunNoise
 from sccal.results.numbers import one_line, plain, short
-from sccal.results.saved_model import MODEL_FILE
 
 RUNS_LISTED = 6
 

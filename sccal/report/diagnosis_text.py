@@ -15,7 +15,8 @@ from sccal.report.rows import Row
 from sccal.report.summary import held_out_drift
 from sccal.report.text import in_columns, labelled, notice_lines, shortened, wrapped
 from sccal.results.calibration import Estimate
-from sccal.results.diagnosis import Detectable, Diagnosis, Finding, Judgement, RunNoise, Unexplained
+from sccal.results.diagnosis import Detectable, Diagnosis, Finding, Judgement, Unexplained
+from sccal.results.model import RunNoise
 from sccal.results.numbers import MISSING, one_line, plain, short, value_and_sigma
 
 FINDINGS_IN_THE_VERDICT = 2
@@ -117,7 +118,7 @@ def unexplained_sentence(left: Unexplained) -> str:
     """What is left and has no name."""
     if not left.significant:
         return "nothing more than chance leaves"
-    port = _PORTS.get(left.port, left.port)
+    port = _PORTS.get(left.port or "", left.port)
     facts = [
         left.size,
         f"{plain(100.0 * left.variance_fraction, 2)} % of its variance",

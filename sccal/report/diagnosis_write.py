@@ -5,19 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from sccal.logs.write import write_text
-from sccal.report.as_json import json_text
-from sccal.report.diagnosis_json import diagnosis_json
-from sccal.report.model_json import model_json
+from sccal.results.converter import document_of, json_text
 from sccal.results.diagnosis import Diagnosis
-from sccal.results.saved_diagnosis import DIAGNOSIS_FILE
-from sccal.results.saved_model import MODEL_FILE
+from sccal.results.files import DIAGNOSIS_FILE, MODEL_FILE
 
 
 def write_diagnosis(d: Diagnosis, out: Path) -> None:
     """``diagnosis.json`` and ``model.json`` first, which need no matplotlib, then the page ``diagnosis.html``."""
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / DIAGNOSIS_FILE, json_text(diagnosis_json(d)))
-    write_text(out / MODEL_FILE, json_text(model_json(d.model)))
+    write_text(out / DIAGNOSIS_FILE, json_text(document_of(d)))
+    write_text(out / MODEL_FILE, json_text(document_of(d.model)))
     from sccal.report.diagnosis_html import diagnosis_html
 
     write_text(out / "diagnosis.html", diagnosis_html(d))

@@ -18,7 +18,6 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from sccal.arrays import Bools, Floats
-from sccal.experiments.plan import TOLERANCE_PERCENT
 from sccal.report.experiments_text import lines_of
 from sccal.report.figures import (
     BLACK,
@@ -39,7 +38,7 @@ from sccal.report.figures import (
     svg_text,
 )
 from sccal.report.text import sentence, shortened
-from sccal.results.experiments import VARIANTS, Cell, Experiments, Trial, Variant
+from sccal.results.experiments import TOLERANCE_PERCENT, VARIANTS, Cell, Experiments, Trial, Variant
 from sccal.results.numbers import short
 
 COLOURS: dict[Variant, str] = {"without": VERMILION, "with": BLUE}

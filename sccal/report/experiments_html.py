@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from sccal import __version__
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
-from sccal.experiments.plan import TOLERANCE_PERCENT
 from sccal.report.experiments_figures import WORDS, cell_drawings, overview_drawing
 from sccal.report.experiments_text import (
     WITHIN,
@@ -25,7 +24,8 @@ from sccal.report.figures import Drawing
 from sccal.report.html import page
 from sccal.report.rows import STATUS_WORDS
 from sccal.report.text import sentence
-from sccal.results.experiments import PARAMETERS, Cell, Experiments
+from sccal.results.calibration import PARAMETERS
+from sccal.results.experiments import TOLERANCE_PERCENT, Cell, Experiments
 from sccal.results.numbers import one_line, short, value_and_sigma
 
 _ROWS = ("right radius (m)", "left radius (m)", "track (m)", "heading offset (deg)")

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sccal.experiments.magnetometer import WANDER_DEG, WANDER_TIME_S
-from sccal.experiments.plan import FIXES_FIRST_S, LOSS, TOLERANCE_PERCENT
+from sccal.experiments.plan import FIXES_FIRST_S, LOSS
 from sccal.report.text import in_columns, labelled, shortened, wrapped
-from sccal.results.experiments import Cell, Experiment, Experiments, Spread
+from sccal.results.experiments import TOLERANCE_PERCENT, Cell, Experiment, Experiments, Spread
 from sccal.results.numbers import duration, one_line, plain, short
 
 WITHIN = f"within {TOLERANCE_PERCENT:g} %"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 
 from sccal.report.rows import parameter_rows
 from sccal.report.summary import (
@@ -129,9 +129,9 @@ def fit_and_outage(fit: Fit, outage: Outage, held_out: HeldOut | None) -> tuple[
 
 def started(c: Calibration) -> str:
     """``2026-05-03 14:05 UTC``; empty where the log has no date."""
-    if c.started_utc_s is None:
+    if c.started is None:
         return ""
-    return f"{datetime.fromtimestamp(c.started_utc_s, tz=UTC):%Y-%m-%d %H:%M} UTC"
+    return f"{datetime.fromisoformat(c.started):%Y-%m-%d %H:%M} UTC"
 
 
 def variant(with_offset: bool) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from sccal.report.text import wrapped
+from sccal.results.calibration import VEHICLE_RUN, Estimate
 from sccal.results.differences import unit_of
 from sccal.results.gates import GateResult
 from sccal.results.numbers import MISSING, one_line, short, with_sigma
-from sccal.results.saved import VEHICLE_RUN, SavedEstimate
 
 REASONS_SHOWN = 12
 """Lines each for gates that failed and for gates that were skipped; the rest by their number."""
@@ -53,7 +53,7 @@ def value_text(value: float | str | None) -> str:
     return one_line(value) if isinstance(value, str) else short(value)
 
 
-def estimate_text(name: str, estimate: SavedEstimate) -> str:
+def estimate_text(name: str, estimate: Estimate) -> str:
     """``parameters.track_m 0.72836 ± 0.00088 m, nominal 0.7``."""
     text = f"{name} {with_sigma(estimate.value, estimate.sigma, unit_of(name.rpartition('.')[2]))}"
     return text if estimate.nominal is None else f"{text}, nominal {short(estimate.nominal)}"

@@ -64,7 +64,7 @@ def run_html(c: Calibration) -> str:
         driven=driven_lines(c.manoeuvres),
         origins=origin_lines(c.provenance) if c.provenance else (),
         notices=warnings_first(c.notices),
-        origin=f"{c.origin_lat_deg:.7f}, {c.origin_lon_deg:.7f}",
+        origin=f"{c.origin.lat_deg:.7f}, {c.origin.lon_deg:.7f}",
         version=__version__,
         variant=variant(c.with_offset),
     )

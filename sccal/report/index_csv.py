@@ -10,7 +10,8 @@ import csv
 import io
 import math
 
-from sccal.results.saved import PARAMETERS, SavedEstimate
+from sccal.results.calibration import PARAMETERS, Estimate, Fit
+from sccal.results.converter import document_of, entries_of
 from sccal.results.summary import FailedRun, RunLine, Summary
 
 FORMULA_MARKS = ("=", "+", "-", "@", "\t", "\r", "\n", "\0", "＝", "＋", "－", "＠")
@@ -34,9 +35,7 @@ def summary_csv(summary: Summary) -> str:
     or what the verdict rests on.
     """
     keys = [*PARAMETERS, *dict.fromkeys(key for run in summary.runs for key in _effects(run))]
-    fit = list(
-        dict.fromkeys(key for run in summary.runs for key, value in run.fit.items() if not isinstance(value, str))
-    )
+    fit = [one.key for one in entries_of(Fit)] if summary.runs else []
     header = [
         *_FIRST,
         *(name for key in keys for name in (key, f"{key}_sigma", f"{key}_status")),
@@ -48,22 +47,22 @@ def summary_csv(summary: Summary) -> str:
     writer = csv.writer(buffer, lineterminator="\r\n")
     writer.writerow([_text(name) for name in header])
     for run in summary.runs:
-        writer.writerow([_cell(cell) for cell in _run(run, keys, fit)])
+        writer.writerow([_cell(cell) for cell in _run(run, keys)])
     for failed in summary.failures:
         writer.writerow([_cell(cell) for cell in _failed(failed, len(header))])
     return buffer.getvalue()
 
 
-def _run(run: RunLine, keys: list[str], fit: list[str]) -> list[Cell]:
+def _run(run: RunLine, keys: list[str]) -> list[Cell]:
     estimates = {**run.parameters, **_effects(run)}
-    cells: list[Cell] = [run.run, run.vehicle, run.started, run.level, run.duration_s, run.distance_m]
+    cells: list[Cell] = [run.run, run.vehicle, run.started, run.verdict.level, run.duration_s, run.distance_m]
     for key in keys:
         one = estimates.get(key)
         cells += [None, None, None] if one is None else [one.value, one.sigma, one.status]
-    cells += [run.fit.get(key) for key in fit]
-    o = run.outage
+    cells += document_of(run.fit).values()
+    o = run.outage_in_short
     cells += [o.window_s, o.windows, o.rms_m, o.end_rms_m, o.percent_of_distance]
-    return [*cells, len(run.warnings), 0, run.verdict.partition(":")[2].strip()]
+    return [*cells, len(run.warnings), 0, "; ".join(run.verdict.because)]
 
 
 def _failed(failed: FailedRun, columns: int) -> list[Cell]:
@@ -71,7 +70,7 @@ def _failed(failed: FailedRun, columns: int) -> list[Cell]:
     return [*first, *[None] * (columns - len(first) - 2), failed.exit_code, failed.reason]
 
 
-def _effects(run: RunLine) -> dict[str, SavedEstimate]:
+def _effects(run: RunLine) -> dict[str, Estimate]:
     return {f"{effect}.{name}": one for effect, named in run.effects.items() for name, one in named.items()}
 
 

@@ -16,7 +16,6 @@ from sccal.report.index_figures import control_chart, path_strokes
 from sccal.report.index_lines import (
     LEVEL_MARKS,
     Shown,
-    change_sentence,
     chart_line,
     day,
     headline,
@@ -26,9 +25,9 @@ from sccal.report.index_lines import (
     versions_line,
 )
 from sccal.report.rows import STATUS_WORDS
+from sccal.results.calibration import PARAMETERS, VEHICLE_RUN, Estimate
 from sccal.results.gates import GateResult
 from sccal.results.numbers import duration, one_line, plain
-from sccal.results.saved import PARAMETERS, VEHICLE_RUN, SavedEstimate
 from sccal.results.summary import Chart, RunLine, Summary, VehicleSummary
 
 MOST_FIGURES = 12
@@ -107,7 +106,7 @@ class GateLine:
     failed: tuple[str, ...]
 
 
-def index_html(summary: Summary, gates: Sequence[GateResult] = ()) -> str:
+def index_html(summary: Summary) -> str:
     """The page; it links to each run's own page, ``<run>/report.html``."""
     columns = _columns(summary)
     many = len(summary.vehicles) > 1
@@ -120,7 +119,7 @@ def index_html(summary: Summary, gates: Sequence[GateResult] = ()) -> str:
             (mark, level, count)
             for (level, mark), count in zip(LEVEL_MARKS.items(), (t.good, t.partial, t.doubtful, t.failed), strict=True)
         ],
-        gates=_gates(gates),
+        gates=_gates(summary.gates),
         vehicles=[_vehicle(vehicle, rank < MOST_FIGURES) for rank, vehicle in enumerate(_ranked(summary.vehicles))],
         headers=[
             *(["vehicle"] if many else []),
@@ -167,14 +166,14 @@ def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow
                 _key(run.outage.percent_of_distance),
             ),
         ),
-        level=_level(run.level),
-        mark=LEVEL_MARKS[_level(run.level)],
-        why="" if run.level == "good" else one_line(run.verdict.partition(":")[2]),
+        level=run.verdict.level,
+        mark=LEVEL_MARKS[run.verdict.level],
+        why="" if run.verdict.level == "good" else one_line("; ".join(run.verdict.because)),
         warnings=len(run.warnings),
     )
 
 
-def _estimate(column: Shown, estimate: SavedEstimate | None) -> Cell:
+def _estimate(column: Shown, estimate: Estimate | None) -> Cell:
     if estimate is None:
         return Cell("–", "")
     tag = "" if estimate.status == "estimated" else _STATUS_WORDS.get(estimate.status, one_line(estimate.status))
@@ -188,7 +187,7 @@ def _key(number: float | None) -> str:
 
 def _small(run: RunLine) -> SmallPath:
     extent = f"{plain(float(np.ptp(run.path.east_m)), 2)} × {plain(float(np.ptp(run.path.north_m)), 2)} m"
-    level = _level(run.level)
+    level = run.verdict.level
     return SmallPath(one_line(run.run), _link(run.run), path_strokes(run.path), extent, level, LEVEL_MARKS[level])
 
 
@@ -214,7 +213,7 @@ def _chart(vehicle: VehicleSummary, chart: Chart, drawn: bool) -> ChartPart:
         name=as_shown.name,
         value=value,
         says=chart_line(chart),
-        change=change_sentence(vehicle.label, chart) if chart.trend is not None else "",
+        change="" if chart.trend is None else chart.trend.sentence,
         svg=control_chart(vehicle.label, chart) if drawn else "",
     )
 
@@ -249,10 +248,6 @@ def _gates(gates: Sequence[GateResult]) -> list[GateLine]:
 def _window(runs: Sequence[RunLine]) -> str:
     windows = {run.outage.window_s for run in runs if run.outage.window_s is not None and run.outage.windows}
     return f"after {plain(windows.pop(), 2)} s" if len(windows) == 1 else "at the end of the windows"
-
-
-def _level(level: str) -> str:
-    return level if level in LEVEL_MARKS else "doubtful"
 
 
 def _link(run: str) -> str:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from sccal.report.rows import effect_rows
 from sccal.results.calibration import Estimate
 from sccal.results.numbers import duration, one_line, plain, value_and_sigma
-from sccal.results.saved import SavedEstimate
 from sccal.results.summary import Chart, RunLine, Summary, Totals, Trend, VehicleSummary
 
 LEVEL_MARKS = {"good": "✓", "partial": "◐", "doubtful": "▲", "failed": "✕"}
@@ -32,7 +31,7 @@ class Shown:
     factor: float
     """From the file's unit to the one shown."""
 
-    def text(self, estimate: SavedEstimate) -> str:
+    def text(self, estimate: Estimate) -> str:
         """Value ± sigma without unit, rounded together; ``–`` where it is only the prior."""
         if estimate.status == "unobserved" or not math.isfinite(estimate.value):
             return "–"
@@ -65,14 +64,27 @@ def shown(key: str) -> Shown:
     return Shown(key, one_line(row.name), row.unit, 1.0)
 
 
+def with_sentences(summary: Summary) -> Summary:
+    """The summary with every change told in words."""
+
+    def told(vehicle: str, chart: Chart) -> Chart:
+        if chart.trend is None:
+            return chart
+        return replace(chart, trend=replace(chart.trend, sentence=change_sentence(vehicle, chart)))
+
+    return replace(
+        summary,
+        vehicles=tuple(
+            replace(vehicle, charts=tuple(told(vehicle.label, chart) for chart in vehicle.charts))
+            for vehicle in summary.vehicles
+        ),
+    )
+
+
 def changes(summary: Summary) -> list[str]:
     """One sentence for each parameter that changes, vehicle by vehicle."""
-    return [
-        change_sentence(vehicle.label, chart)
-        for vehicle in summary.vehicles
-        for chart in vehicle.charts
-        if chart.trend is not None
-    ]
+    charts = (chart for vehicle in summary.vehicles for chart in vehicle.charts)
+    return [chart.trend.sentence for chart in charts if chart.trend is not None]
 
 
 def change_sentence(vehicle: str, chart: Chart) -> str:
@@ -155,7 +167,7 @@ def versions_line(runs: Iterable[RunLine]) -> str:
 
 def vehicle_line(vehicle: VehicleSummary) -> str:
     """Its runs and its verdict."""
-    return _count(vehicle.runs, "run") + (f" · {one_line(vehicle.verdict)}" if vehicle.verdict else "")
+    return _count(vehicle.runs, "run") + (f" · {one_line(str(vehicle.verdict))}" if vehicle.verdict else "")
 
 
 def day(started: str | None) -> str:

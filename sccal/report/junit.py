@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from sccal.errors import Failure, one_line
 from sccal.report.gates_text import estimate_text, gate_line
+from sccal.results.calibration import Calibration, Estimate, named_estimates
 from sccal.results.differences import why_not_estimated
 from sccal.results.gates import BatchOutcome, GateResult
-from sccal.results.saved import Saved, SavedEstimate
 
 SUITES = "sccal calibrate"
 
@@ -27,15 +27,15 @@ def junit_xml(outcome: BatchOutcome, seconds: Mapping[str, float] | None = None)
     """The whole document, UTF-8 with its declaration; ``seconds`` that each run took, by its name."""
     root = ET.Element("testsuites", name=SUITES)
     names: set[str] = set()
-    for saved in outcome.runs:
-        of_run = [gate for gate in outcome.gates if (gate.run, gate.vehicle) == (saved.run, saved.vehicle)]
-        _suite(root, _free(saved.run, names), _run_cases(saved, of_run), (seconds or {}).get(saved.run, 0.0))
+    for run in outcome.runs:
+        of_run = [gate for gate in outcome.gates if (gate.run, gate.vehicle) == (run.run, run.vehicle.name)]
+        _suite(root, _free(run.run, names), _run_cases(run, of_run), (seconds or {}).get(run.run, 0.0))
     for failure in outcome.failures:
         _suite(root, _free(failure.name, names), [("calibrate", _error(failure))], (seconds or {}).get(failure.name, 0))
-    for saved in outcome.vehicles:
-        of_vehicle = [gate for gate in outcome.gates if (gate.run, gate.vehicle) == (saved.run, saved.vehicle)]
+    for one in outcome.vehicles.values():
+        of_vehicle = [gate for gate in outcome.gates if (gate.run, gate.vehicle) == (one.run, one.vehicle.name)]
         if of_vehicle:
-            _suite(root, _free(f"{saved.run} {saved.vehicle}", names), _gate_cases(of_vehicle), 0.0)
+            _suite(root, _free(f"{one.run} {one.vehicle.name}", names), _gate_cases(of_vehicle), 0.0)
     for count in ("tests", "failures", "errors"):
         root.set(count, str(sum(int(suite.get(count, "0")) for suite in root)))
     root.set("time", f"{sum(float(suite.get('time', '0')) for suite in root):.3f}")
@@ -55,16 +55,10 @@ def _suite(root: ET.Element, name: str, cases: Sequence[tuple[str, _Case]], seco
     suite.set("time", f"{seconds:.3f}")
 
 
-def _run_cases(saved: Saved, gates: Iterable[GateResult]) -> list[tuple[str, _Case]]:
-    parameters = [(f"parameters.{key}", estimate) for key, estimate in saved.parameters.items()]
-    effects = [
-        (f"effects.{effect}.{key}", estimate)
-        for effect, named in saved.effects.items()
-        for key, estimate in named.items()
-    ]
+def _run_cases(run: Calibration, gates: Iterable[GateResult]) -> list[tuple[str, _Case]]:
     return [
-        ("calibrate", _passed(saved.verdict)),
-        *((name, _parameter(name, estimate)) for name, estimate in (*parameters, *effects)),
+        ("calibrate", _passed(str(run.verdict))),
+        *((name, _parameter(name, estimate)) for name, estimate in named_estimates(run).items()),
         *_gate_cases(gates),
     ]
 
@@ -81,7 +75,7 @@ def _error(failure: Failure) -> _Case:
     return lambda case: _tell(case, "error", str(failure.error), type(failure.error).__name__)
 
 
-def _parameter(name: str, estimate: SavedEstimate) -> _Case:
+def _parameter(name: str, estimate: Estimate) -> _Case:
     why = why_not_estimated(estimate)
     if not why:
         return _passed(estimate_text(name, estimate))

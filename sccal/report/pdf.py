@@ -103,7 +103,7 @@ def _tables(paper: _Paper, c: Calibration) -> None:
             paper.paragraph(f"SHA-256 {one.sha256}", NOTE, SOFT, indent=8.0)
         paper.facts(origin_lines(c.provenance))
     paper.space(8.0)
-    origin = f"origin {c.origin_lat_deg:.7f}, {c.origin_lon_deg:.7f}"
+    origin = f"origin {c.origin.lat_deg:.7f}, {c.origin.lon_deg:.7f}"
     paper.paragraph(f"sccal {__version__} · {variant(c.with_offset)} · {origin}", NOTE, SOFT)
 
 

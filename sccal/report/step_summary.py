@@ -8,9 +8,9 @@ from pathlib import Path
 
 from sccal.errors import UsageError
 from sccal.report.gates_text import gate_line, gates_count, whose
+from sccal.results.calibration import Calibrated, Calibration, Estimate
 from sccal.results.gates import BatchOutcome, Outcome
 from sccal.results.numbers import MISSING, one_line, plain, value_and_sigma
-from sccal.results.saved import Saved, SavedEstimate
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
 MOST_BYTES = 1024 * 1024
@@ -48,7 +48,8 @@ def step_summary(outcome: BatchOutcome) -> str:
     lines += _gates(outcome, "failed")
     if outcome.runs:
         header = ("run", "verdict", "R_right mm", "R_left mm", "track mm", "offset deg", "drift %")
-        lines += _table(header, (_row(saved) for saved in (*outcome.runs, *outcome.vehicles)))
+        results: list[Calibrated] = [*outcome.runs, *outcome.vehicles.values()]
+        lines += _table(header, map(_row, results))
     lines += _lacking(outcome.runs)
     lines += _gates(outcome, "skipped")
     return "\n".join(lines) + "\n"
@@ -60,9 +61,8 @@ def _gates(outcome: BatchOutcome, which: Outcome) -> Iterator[str]:
         yield from _table((f"gate {which}", "of"), ((gate_line(one), whose(one)) for one in told))
 
 
-def _lacking(runs: Sequence[Saved]) -> Iterator[str]:
-    found = [(saved, saved.document.get("missing") or ()) for saved in runs]
-    rows = [(saved.run, ", ".join(f"{one['effect']}: {one['title']}" for one in some)) for saved, some in found if some]
+def _lacking(runs: Sequence[Calibration]) -> Iterator[str]:
+    rows = [(run.run, ", ".join(f"{one.effect}: {one.title}" for one in run.missing)) for run in runs if run.missing]
     if rows:
         yield from _table(("run", "sccal diagnose would name"), rows)
 
@@ -84,18 +84,17 @@ def _headline(outcome: BatchOutcome) -> str:
     return ", ".join(parts)
 
 
-def _row(saved: Saved) -> tuple[str, ...]:
-    level = saved.verdict.partition(":")[0]
-    percent = saved.document.get("outage", {}).get("percent_of_distance")
+def _row(result: Calibrated) -> tuple[str, ...]:
+    level, percent = result.verdict.level, result.outage.percent_of_distance
     return (
-        f"vehicle {saved.vehicle}" if saved.of_vehicle else saved.run,
-        f"{_MEANS.get(level, '')} {level}".strip(),
-        *(_value(estimate, 1e3 if key.endswith("_m") else 1.0) for key, estimate in saved.parameters.items()),
+        f"vehicle {result.vehicle.name}" if result.of_vehicle else result.run,
+        f"{_MEANS[level]} {level}",
+        *(_value(one, 1e3 if key.endswith("_m") else 1.0) for key, one in result.parameters.by_key.items()),
         MISSING if percent is None else plain(percent, 2),
     )
 
 
-def _value(estimate: SavedEstimate, scale: float) -> str:
+def _value(estimate: Estimate, scale: float) -> str:
     if estimate.status == "unobserved":
         return "not observed"
     value, sigma = value_and_sigma(scale * estimate.value, scale * estimate.sigma)

@@ -8,16 +8,16 @@ from collections.abc import Iterable, Sequence
 from sccal.logs.streams import Notice
 from sccal.results.calibration import (
     AgainstReference,
-    Clock,
     Drive,
     Fit,
     HeldOut,
     Missing,
-    Noise,
     Outage,
     OutageWindow,
     Unseen,
 )
+from sccal.results.clock import Clock
+from sccal.results.noise import Noise
 from sccal.results.numbers import MISSING, duration, one_line, plain, short, value_and_sigma
 
 LOSSES_SHOWN = 5

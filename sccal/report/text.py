@@ -24,7 +24,8 @@ from sccal.report.summary import (
     unseen_in_all,
     unseen_line,
 )
-from sccal.results.calibration import Calibration, Estimate, Noise, Parameters, Status, VehicleCalibration
+from sccal.results.calibration import Calibration, Estimate, Parameters, Status, VehicleCalibration
+from sccal.results.noise import Noise
 from sccal.results.numbers import duration, one_line, plain, short, value_and_sigma
 
 NOTICES_SHOWN = 5

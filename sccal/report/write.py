@@ -7,12 +7,12 @@ import threading
 from pathlib import Path
 
 from sccal.logs.write import write_bytes, write_text
-from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.calibration_mcap import write_calibration_mcap
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
 from sccal.results.calibration import Calibration, VehicleCalibration
-from sccal.results.saved import RESULT_FILE, TRAJECTORY_FILE
+from sccal.results.converter import document_of, json_text
+from sccal.results.files import RESULT_FILE, TRAJECTORY_FILE
 
 MCAP_FILE = "calibration.mcap"
 PDF_FILE = "report.pdf"
@@ -26,7 +26,7 @@ def begin_loading() -> None:
 def write_numbers(c: Calibration, folder: Path) -> None:
     """Everything of a run but the page, and so without matplotlib: JSON, both trajectories, YAML."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / RESULT_FILE, json_text(calibration_json(c)))
+    write_text(folder / RESULT_FILE, json_text(document_of(c)))
     write_text(folder / TRAJECTORY_FILE, trajectory_csv(c.trajectory))
     write_text(folder / "trajectory.tum", trajectory_tum(c.trajectory))
     write_text(folder / "ros2_control.yaml", ros2_control_yaml(c))
@@ -53,7 +53,7 @@ def write_calibration(c: Calibration, folder: Path, with_mcap: bool = False, wit
 def write_vehicle(v: VehicleCalibration, out: Path, stem: str = "vehicle") -> None:
     """``<stem>.json`` and the parameters to deploy; for several runs a page, which expects their folders beside it."""
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / f"{stem}.json", json_text(vehicle_json(v)))
+    write_text(out / f"{stem}.json", json_text(document_of(v)))
     yaml_name = "ros2_control.yaml" if stem == "vehicle" else f"{stem}-ros2_control.yaml"
     write_text(out / yaml_name, ros2_control_yaml(v))
     if len(v.runs) > 1:

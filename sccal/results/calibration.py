@@ -8,47 +8,26 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.inputs import InputFile
 from sccal.logs.streams import Notice, Vehicle
 from sccal.results.clock import Clock
 from sccal.results.noise import Noise
-from sccal.results.numbers import wrapped_deg
+from sccal.results.numbers import radians_of, wrapped_deg
 from sccal.results.verdict import Verdict
-
-__all__ = [
-    "AgainstReference",
-    "Calibration",
-    "Cause",
-    "Clock",
-    "Consistency",
-    "Drive",
-    "Estimate",
-    "Fit",
-    "Fixes",
-    "HeldOut",
-    "History",
-    "InputFile",
-    "Manoeuvre",
-    "Missing",
-    "Noise",
-    "Outage",
-    "OutageWindow",
-    "Parameters",
-    "Provenance",
-    "Residuals",
-    "Status",
-    "Trajectory",
-    "Unseen",
-    "VehicleCalibration",
-]
 
 Status = Literal["estimated", "unobserved", "at_bound", "held"]
 PARAMETERS = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_deg")
 """Names of the constants in files."""
 OFFSET_KEY = PARAMETERS[3]
+CALIBRATION_SCHEMA = "sccal.calibration/1"
+VEHICLE_RUN = "(vehicle)"
+"""The ``run`` of a vehicle's file; no folder of results can have that name on its own."""
+FilterName = Literal["sc_ekf", "sc_ekf_offset"]
+FILTERS: tuple[FilterName, FilterName] = ("sc_ekf", "sc_ekf_offset")
+"""The filters of the paper, without and with the heading offset as a state."""
 UNJUDGED = Verdict("doubtful", ("not judged yet",))
 
 
@@ -65,6 +44,8 @@ class Estimate:
     """The declared prior value; None where there is none (the heading offset)."""
     prior_sigma: float | None = None
 
+    WRITTEN: ClassVar[str] = "value! sigma! status reason nominal prior_sigma"
+
     @property
     def in_degrees(self) -> Estimate:
         """An angle in radians: its values wrapped into (−180, 180], its spreads only converted."""
@@ -77,6 +58,18 @@ class Estimate:
             None if self.prior_sigma is None else math.degrees(self.prior_sigma),
         )
 
+    @property
+    def in_radians(self) -> Estimate:
+        """An angle in degrees, as it stands in a file."""
+        return Estimate(
+            radians_of(self.value),
+            radians_of(self.sigma),
+            self.status,
+            self.reason,
+            None if self.nominal is None else radians_of(self.nominal),
+            None if self.prior_sigma is None else radians_of(self.prior_sigma),
+        )
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -87,6 +80,8 @@ class Parameters:
     track_m: Estimate
     heading_offset_rad: Estimate
     """What the AHRS reads, turned into enu, minus the robot's heading; in (−π, π]."""
+
+    WRITTEN: ClassVar[str] = "radius_right_m! radius_left_m! track_m! heading_offset_rad!"
 
     @property
     def by_key(self) -> dict[str, Estimate]:
@@ -127,6 +122,8 @@ class OutageWindow:
     drift_m: Floats
     """Distance between the predicted and the withheld fix at those times."""
 
+    WRITTEN: ClassVar[str] = "start_s end_s distance_m rms_m=rms_drift_m end_m=end_drift_m"
+
 
 @dataclass(frozen=True)
 class Outage:
@@ -142,6 +139,13 @@ class Outage:
     how: str
     """Which data taught the filter and which judged it, in words."""
 
+    WRITTEN: ClassVar[str] = "window_s windows=count rms_m end_rms_m percent_of_distance how each=windows"
+
+    @property
+    def count(self) -> int:
+        """How many windows there are."""
+        return len(self.windows)
+
 
 @dataclass(frozen=True)
 class AgainstReference:
@@ -153,6 +157,8 @@ class AgainstReference:
     """Root mean square distance of the predicted from the undisplaced fixes; None where none was displaced."""
     displaced: int
     """How many fixes that is."""
+
+    WRITTEN: ClassVar[str] = "losses displaced displaced_rms_m"
 
 
 @dataclass(frozen=True)
@@ -167,6 +173,8 @@ class Unseen:
     """What its standard deviation would be, were it estimated."""
     smallest: float
     """Smallest size that would stand out."""
+
+    WRITTEN: ClassVar[str] = "effect parameter unit sigma smallest"
 
 
 @dataclass(frozen=True)
@@ -322,16 +330,24 @@ class Provenance:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where the tangent plane touches the earth, WGS 84; NaN where a file does not tell it."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class Calibration:
-    """One run, calibrated."""
+    """One run, calibrated: what its file holds, and beside it what grows with the run's length."""
 
     run: str
     vehicle: Vehicle
     with_offset: bool
     """False for the paper's SC EKF without the offset state."""
     parameters: Parameters
-    origin_lat_deg: float
-    origin_lon_deg: float
+    origin: Origin
     fit: Fit
     outage: Outage
     noise: Noise
@@ -349,10 +365,8 @@ class Calibration:
     against_reference: AgainstReference | None = None
     """None where all fixes teach and were never displaced."""
     unseen: tuple[Unseen, ...] = ()
-    origin_alt_m: float = 0.0
-    """Height at which the tangent plane lies."""
-    started_utc_s: float | None = None
-    """Unix time at which the wheels' log begins; None where the log has no date."""
+    started: str | None = None
+    """When the wheels' log begins, ISO 8601 in UTC; None where the log has no date."""
     provenance: Provenance | None = None
     """None where the run does not come from files."""
     causes: tuple[Cause, ...] = ()
@@ -363,6 +377,36 @@ class Calibration:
     held_out: HeldOut | None = None
     """By stretches of the run; None where it is too short to leave any out."""
     verdict: Verdict = UNJUDGED
+
+    SCHEMA: ClassVar[str] = CALIBRATION_SCHEMA
+    WRITTEN: ClassVar[str] = (
+        "run! vehicle started variant verdict parameters! effects origin fit outage held_out missing "
+        "reference=against_reference unseen noise drive clock notices provenance"
+    )
+
+    @property
+    def variant(self) -> FilterName:
+        """The filter of the paper that it was."""
+        return FILTERS[self.with_offset]
+
+    @property
+    def of_vehicle(self) -> bool:
+        """Whether it is several runs as one problem."""
+        return False
+
+    @staticmethod
+    def further(document: Mapping[str, Any], _: Any) -> dict[str, Any]:
+        """What a document tells in other words."""
+        return {"with_offset": document.get("variant") != FILTERS[False]}
+
+
+@dataclass(frozen=True)
+class RunInShort:
+    """A run in the file of its vehicle."""
+
+    run: str
+    verdict: Verdict
+    parameters: Parameters
 
 
 @dataclass(frozen=True)
@@ -386,3 +430,55 @@ class VehicleCalibration:
     missing: tuple[Missing, ...] = ()
     """What the model seems to lack in some run, the strongest first."""
     verdict: Verdict = UNJUDGED
+
+    SCHEMA: ClassVar[str] = CALIBRATION_SCHEMA
+    WRITTEN: ClassVar[str] = (
+        "run vehicle variant verdict parameters! effects consistency_chi2_per_dof fit outage held_out missing "
+        "runs=in_short notices"
+    )
+
+    @property
+    def run(self) -> str:
+        """What a vehicle's file has in place of a run's name."""
+        return VEHICLE_RUN
+
+    @property
+    def variant(self) -> FilterName:
+        """The filter of the paper that it was."""
+        return FILTERS[self.with_offset]
+
+    @property
+    def of_vehicle(self) -> bool:
+        """Whether it is several runs as one problem."""
+        return True
+
+    @property
+    def started(self) -> None:
+        """Several runs have no one beginning."""
+        return
+
+    @property
+    def provenance(self) -> None:
+        """The runs have their own."""
+        return
+
+    @property
+    def in_short(self) -> tuple[RunInShort, ...]:
+        """The runs, as far as the vehicle's file tells of them."""
+        return tuple(RunInShort(one.run, one.verdict, one.parameters) for one in self.runs)
+
+    @staticmethod
+    def further(document: Mapping[str, Any], part: Any) -> dict[str, Any]:
+        """What a document tells in other words: of its runs only what is told in short."""
+        runs = part("runs", tuple[Calibration, ...]) if "runs" in document else ()
+        return {"with_offset": document.get("variant") != FILTERS[False], "runs": runs}
+
+
+Calibrated = Calibration | VehicleCalibration
+
+
+def named_estimates(calibrated: Calibrated) -> dict[str, Estimate]:
+    """Every estimate by its dotted name in the file: ``parameters.track_m``, ``effects.lever_arm.left_m``."""
+    return {f"parameters.{key}": one for key, one in calibrated.parameters.by_key.items()} | {
+        f"effects.{effect}.{name}": one for effect, named in calibrated.effects.items() for name, one in named.items()
+    }

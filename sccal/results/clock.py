@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 
 @dataclass(frozen=True)
@@ -28,3 +28,5 @@ class Clock:
     sigma_skew_ppm: float = 0.0
     offset_at_start_s: float | None = None
     """Logging clock minus UTC at the first fix; None where the log has no UTC."""
+
+    WRITTEN: ClassVar[str] = "source offset_s sigma_offset_s skew_ppm sigma_skew_ppm offset_at_start_s jitter_s knots"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
+from sccal.results.calibration import Estimate, Status
 from sccal.results.differences import Difference
-from sccal.results.saved import SavedEstimate
 
 Change = Literal["changed", "unchanged", "not comparable"]
 Kind = Literal["calibration", "diagnosis"]
@@ -24,19 +24,56 @@ class Side:
 
 
 @dataclass(frozen=True)
+class Stated:
+    """One of two estimates that are compared."""
+
+    value: float
+    sigma: float
+    status: Status
+    reason: str
+
+
+@dataclass(frozen=True)
 class Pair:
     """One parameter in both results."""
 
     name: str
     """Dotted, as in the file: ``parameters.track_m``, ``effects.lever_arm.left_m``."""
-    a: SavedEstimate | None
+    a: Estimate | None
     """None where the result does not have it."""
-    b: SavedEstimate | None
+    b: Estimate | None
     difference: Difference | None
     """None where the two cannot be compared."""
     change: Change
     reason: str
     """Why they cannot be compared; empty where they can."""
+
+    WRITTEN: ClassVar[str] = "name change reason a=stated_a b=stated_b difference=amount sigma in_sigmas"
+
+    @property
+    def stated_a(self) -> Stated | None:
+        """A's, as far as a comparison repeats it."""
+        return _stated(self.a)
+
+    @property
+    def stated_b(self) -> Stated | None:
+        """B's, as far as a comparison repeats it."""
+        return _stated(self.b)
+
+    @property
+    def amount(self) -> float | None:
+        """B − A, in the unit of the name."""
+        return None if self.difference is None else self.difference.amount
+
+    @property
+    def sigma(self) -> float | None:
+        """Of the difference."""
+        return None if self.difference is None else self.difference.sigma
+
+    @property
+    def in_sigmas(self) -> float | None:
+        """The difference over its sigma."""
+        return None if self.difference is None else self.difference.in_sigmas
 
 
 @dataclass(frozen=True)
@@ -64,6 +101,11 @@ class FoundEffect:
     reason: str
     """What the diagnosis without it says of it; empty where it says nothing."""
 
+    WRITTEN: ClassVar[str] = (
+        "effect change evidence_nats_a=nats_a evidence_nats_b=nats_b held_out_gain_nats_a=held_out_a "
+        "held_out_gain_nats_b=held_out_b reason"
+    )
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -81,6 +123,9 @@ class Comparison:
     remarks: tuple[str, ...]
     """What the reader must know: data shared, vehicles or options that differ."""
 
+    SCHEMA: ClassVar[str] = "sccal.comparison/1"
+    WRITTEN: ClassVar[str] = "kind a b sigmas changed parameters=pairs figures findings=effects remarks"
+
     @property
     def changed(self) -> tuple[str, ...]:
         """Names of what changed: parameters beyond their uncertainty, findings gained and lost."""
@@ -91,3 +136,7 @@ class Comparison:
     def comparable(self) -> bool:
         """Whether anything could be compared."""
         return self.kind == "diagnosis" or any(one.change != "not comparable" for one in self.pairs)
+
+
+def _stated(one: Estimate | None) -> Stated | None:
+    return None if one is None else Stated(one.value, one.sigma, one.status, one.reason)

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 from sccal.arrays import Floats
 from sccal.logs.streams import Notice, Vehicle
-from sccal.results.calibration import Estimate, Noise, OutageWindow, Parameters
-from sccal.results.model import JudgedModel
+from sccal.results.calibration import Estimate, OutageWindow, Parameters
+from sccal.results.model import JudgedModel, Measured, RunNoise, measured, unmeasured
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,17 @@ class Ranked:
     size: float
     """Largest parameter in units of the smallest size that matters."""
 
+    WRITTEN: ClassVar[str] = "effect=name title named evidence_nats t size"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a finding, as a file has it in one block."""
+
+    evidence_nats: float
+    held_out_gain_nats: float
+    t: float
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -78,6 +90,27 @@ class Finding:
     aligned: bool = False
     """Whether all of it was found, and put right, when the streams were brought onto one clock, before any fit."""
 
+    WRITTEN: ClassVar[str] = (
+        "effect=name! title reference parameters=measured evidence indistinguishable_from aligned per_run advice "
+        "drift_before_m drift_after_m ranking picture"
+    )
+
+    @property
+    def measured(self) -> Mapping[str, Measured]:
+        """The parameters, each with its unit."""
+        return measured(self.parameters, self.units)
+
+    @property
+    def evidence(self) -> Evidence:
+        """What speaks for it."""
+        return Evidence(self.evidence_nats, self.held_out_gain_nats, self.t)
+
+    @staticmethod
+    def further(_: Mapping[str, Any], part: Any) -> dict[str, Any]:
+        """What a document tells in other words."""
+        parameters, units = unmeasured(part("parameters", Mapping[str, Measured]))
+        return {"parameters": parameters, "units": units, **vars(part("evidence", Evidence))}
+
 
 @dataclass(frozen=True)
 class NotExcited:
@@ -86,6 +119,8 @@ class NotExcited:
     name: str
     title: str
     advice: str
+
+    WRITTEN: ClassVar[str] = "effect=name title advice"
 
 
 @dataclass(frozen=True)
@@ -98,6 +133,8 @@ class Detectable:
     """By parameter, in the files' units."""
     units: Mapping[str, str]
 
+    WRITTEN: ClassVar[str] = "effect=name title smallest units"
+
 
 @dataclass(frozen=True)
 class Inseparable:
@@ -105,6 +142,8 @@ class Inseparable:
 
     names: tuple[str, ...]
     advice: str
+
+    WRITTEN: ClassVar[str] = "effects=names advice"
 
 
 @dataclass(frozen=True)
@@ -121,20 +160,30 @@ class Judgement:
     heading_innovation_rms_rad: float
     nll_per_measurement: float
 
+    WRITTEN: ClassVar[str] = (
+        "outage_rms_m outage_end_rms_m outage_end_interval_m window_s windows=count gnss_innovation_rms_m "
+        "heading_innovation_rms_rad nll_per_measurement"
+    )
+
+    @property
+    def count(self) -> int:
+        """How many windows there are."""
+        return len(self.windows)
+
 
 @dataclass(frozen=True)
 class Unexplained:
     """What is left and has no name."""
 
     significant: bool
-    port: str = ""
-    """heading, along, turn, side, antenna_forward, antenna_left, east or north; empty where nothing is significant."""
-    depends_on: str = ""
-    variance_fraction: float = 0.0
+    port: str | None = None
+    """heading, along, turn, side, antenna_forward, antenna_left, east or north; None where nothing is significant."""
+    depends_on: str | None = None
+    variance_fraction: float = 0
     """Share of the error variance at that port that the pattern holds."""
-    evidence_nats: float = 0.0
-    t: float = 0.0
-    size: str = ""
+    evidence_nats: float = 0
+    t: float = 0
+    size: str | None = None
     """In words: "up to 2.1 deg"."""
     picture: Picture | None = None
 
@@ -152,11 +201,10 @@ class Placebo:
 
 
 @dataclass(frozen=True)
-class RunNoise:
-    """The noise of one run with the findings in the model."""
+class HowHeldOut:
+    """How a diagnosis judged before and after."""
 
-    run: str
-    noise: Noise
+    how: str
 
 
 @dataclass(frozen=True)
@@ -184,3 +232,14 @@ class Diagnosis:
     notices: tuple[Notice, ...]
     model: JudgedModel
     """The model of ``after``, for other commands to start from."""
+
+    SCHEMA: ClassVar[str] = "sccal.diagnosis/1"
+    WRITTEN: ClassVar[str] = (
+        "vehicle runs! trust findings! taken_back not_excited detectable inseparable before! after! held_out "
+        "unexplained placebo parameters_before parameters_after noise=noises notices"
+    )
+
+    @property
+    def held_out(self) -> HowHeldOut:
+        """How before and after were judged."""
+        return HowHeldOut(self.held_out_how)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from sccal.results.saved import SavedEstimate
+from sccal.results.calibration import Estimate
 
 OFFSET_KEY = "heading_offset_deg"
 _UNITS = ("m", "deg", "s", "ppm")
@@ -34,7 +34,7 @@ class Difference:
         return self.amount / self.sigma
 
 
-def difference(key: str, before: SavedEstimate, after: SavedEstimate) -> Difference:
+def difference(key: str, before: Estimate, after: Estimate) -> Difference:
     """From ``before`` to ``after``; ``key`` as in calibration.json, for an effect its parameter's name."""
     amount = after.value - before.value
     if key == OFFSET_KEY and math.isfinite(amount):
@@ -63,7 +63,7 @@ def why_own_log_only(key: str, beside: Collection[str]) -> str:
     return ""
 
 
-def why_not_estimated(estimate: SavedEstimate) -> str:
+def why_not_estimated(estimate: Estimate) -> str:
     """Why an estimate cannot stand in a comparison, in a few words and its reason; empty where it can."""
     reason = f": {estimate.reason}" if estimate.reason else ""
     if estimate.status == "unobserved":

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from sccal.arrays import Bools, Floats
-from sccal.results.calibration import History, Parameters, Status, Trajectory
+from sccal.results.calibration import FILTERS, PARAMETERS, History, Parameters, Status, Trajectory
 
-PARAMETERS = ("radius_right_m", "radius_left_m", "track_m", "heading_offset_deg")
+TOLERANCE_PERCENT = 1.0
+"""Of R_r, R_l and L, within which a trial counts as having found them."""
 Variant = Literal["without", "with"]
 VARIANTS: tuple[Variant, ...] = ("without", "with")
 """The paper's SC EKF, and SC EKF with offset estimation."""
@@ -80,6 +81,45 @@ class Spread:
 
 
 @dataclass(frozen=True)
+class BySeed:
+    """One parameter in the order of the seeds, in the unit of its name."""
+
+    value: Floats
+    sigma: Floats
+    status: tuple[Status, ...]
+
+
+@dataclass(frozen=True)
+class FaultInShort:
+    """The fault of a cell; sigma and times are None where it has none."""
+
+    kind: Literal["loss", "noise"]
+    sigma_m: float | None
+    quality: int | None
+    from_s: float | None
+    to_s: float | None
+
+
+@dataclass(frozen=True)
+class MeanRatio:
+    """A geometric mean and its interval."""
+
+    mean: float
+    interval_95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Wander:
+    """How the simulated magnetometer's offset wanders: a first-order Gauss-Markov process."""
+
+    sigma_deg: float
+    time_s: float
+
+
+MAGNETOMETER_WANDER = Wander(3.0, 60.0)
+
+
+@dataclass(frozen=True)
 class VariantFigures:
     """One variant in one cell, seed by seed (s,)."""
 
@@ -97,6 +137,36 @@ class VariantFigures:
     rms_spread_m: Spread
     """Median and 5th to 95th percentile of rms_m."""
     end_spread_m: Spread
+
+    WRITTEN: ClassVar[str] = "rms_m rms_median_m rms_5_95_m end_m end_median_m end_5_95_m parameters=parameters_by_seed"
+
+    @property
+    def rms_median_m(self) -> float:
+        """Over the seeds."""
+        return self.rms_spread_m.median
+
+    @property
+    def rms_5_95_m(self) -> tuple[float, float]:
+        """Of 100 seeds 90 lie between."""
+        return self.rms_spread_m.low, self.rms_spread_m.high
+
+    @property
+    def end_median_m(self) -> float:
+        """Over the seeds."""
+        return self.end_spread_m.median
+
+    @property
+    def end_5_95_m(self) -> tuple[float, float]:
+        """Of 100 seeds 90 lie between."""
+        return self.end_spread_m.low, self.end_spread_m.high
+
+    @property
+    def parameters_by_seed(self) -> Mapping[str, BySeed]:
+        """PARAMETERS, each seed by seed."""
+        return {
+            name: BySeed(self.values[:, k], self.sigmas[:, k], tuple(each[k] for each in self.statuses))
+            for k, name in enumerate(PARAMETERS)
+        }
 
 
 @dataclass(frozen=True)
@@ -127,6 +197,54 @@ class Cell:
     shown: Trial
     """The first seed in full."""
 
+    WRITTEN: ClassVar[str] = (
+        "experiment=key title fault path measured seeds variants ratio=mean_ratio truth=truth_by_name "
+        "errors_percent=errors_by_name within_percent=within why_not"
+    )
+
+    @property
+    def key(self) -> str:
+        """Of the experiment."""
+        return self.experiment.key
+
+    @property
+    def title(self) -> str:
+        """Of the experiment."""
+        return self.experiment.title
+
+    @property
+    def fault(self) -> FaultInShort:
+        """The experiment's fault, and from when to when it lasted."""
+        lasted, loss = self.t_s[self.judged], self.experiment.is_loss
+        begin, end = (float(lasted[0]), float(lasted[-1])) if lasted.size else (None, None)
+        sigma_m = None if loss else self.experiment.sigma_m
+        return FaultInShort("loss" if loss else "noise", sigma_m, self.experiment.quality, begin, end)
+
+    @property
+    def variants(self) -> Mapping[str, VariantFigures]:
+        """The figures by the filters' names in files."""
+        return {FILTERS[variant == "with"]: self.figures[variant] for variant in VARIANTS}
+
+    @property
+    def mean_ratio(self) -> MeanRatio:
+        """The ratio with its interval."""
+        return MeanRatio(self.ratio.median, (self.ratio.low, self.ratio.high))
+
+    @property
+    def truth_by_name(self) -> Mapping[str, float] | None:
+        """The truth by PARAMETERS."""
+        return None if self.truth is None else dict(zip(PARAMETERS, self.truth, strict=True))
+
+    @property
+    def errors_by_name(self) -> Mapping[str, Floats]:
+        """Errors in percent by parameter, seed by seed."""
+        return dict(zip(PARAMETERS[:3], self.errors_percent.T, strict=True))
+
+    @property
+    def within(self) -> int | None:
+        """Seeds within the tolerance; None without truth."""
+        return None if self.truth is None else self.within_percent
+
 
 @dataclass(frozen=True)
 class Failed:
@@ -145,3 +263,8 @@ class Experiments:
     """Of the simulated drives."""
     seeds: tuple[int, ...]
     failed: tuple[Failed, ...] = ()
+    tolerance_percent: float = TOLERANCE_PERCENT
+    magnetometer_wander: Wander = MAGNETOMETER_WANDER
+
+    SCHEMA: ClassVar[str] = "sccal.experiments/1"
+    WRITTEN: ClassVar[str] = "duration_s seeds tolerance_percent magnetometer_wander cells failed"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from sccal.errors import Exit, Failure
-from sccal.results.saved import Saved
+from sccal.results.calibration import Calibration, VehicleCalibration
 
 Outcome = Literal["passed", "failed", "skipped"]
 
@@ -30,13 +31,42 @@ class GateResult:
 
 
 @dataclass(frozen=True)
+class NoResult:
+    """A run, or a path on the command line, that gave nothing."""
+
+    run: str
+    error: str
+    """The kind of failure."""
+    exit_code: int
+    message: str
+
+
+@dataclass(frozen=True)
 class BatchOutcome:
     """One call of ``calibrate``, as CI sees it."""
 
-    runs: tuple[Saved, ...]
-    vehicles: tuple[Saved, ...]
+    runs: tuple[Calibration, ...]
+    """Without arrays over time."""
+    vehicles: Mapping[str, VehicleCalibration]
+    """By the name of the file that each stands in."""
     failures: tuple[Failure, ...]
     gates: tuple[GateResult, ...] = ()
+
+    SCHEMA: ClassVar[str] = "sccal.batch/1"
+    WRITTEN: ClassVar[str] = "exit_code runs vehicles=vehicle_results failures=no_results gates"
+
+    @property
+    def vehicle_results(self) -> tuple[VehicleCalibration, ...]:
+        """The vehicles in their order."""
+        return tuple(self.vehicles.values())
+
+    @property
+    def no_results(self) -> tuple[NoResult, ...]:
+        """The failures in the words of a file."""
+        return tuple(
+            NoResult(one.name, type(one.error).__name__, int(one.error.exit_code), str(one.error))
+            for one in self.failures
+        )
 
     @property
     def exit_code(self) -> Exit:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from sccal.arrays import Floats, Ints
 from sccal.logs.streams import Notice, Vehicle
@@ -19,6 +19,8 @@ from sccal.results.verdict import Verdict
 StreamName = Literal["wheels", "heading", "fixes"]
 Shown = Literal["yes", "weak", "no"]
 Weight = Literal["refused", "warning", "note"]
+SPANS_TOLD = 500
+"""Stretches of one quality in a file, at most."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Unread:
     what: str
     """wheels, heading, fixes, vehicle, or run."""
     why: str
+
+    WRITTEN: ClassVar[str] = "what error=why"
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,11 @@ class StreamFacts:
     """Rows that the reader dropped or put in order; the notices say which."""
     shares_time: bool
     """False where no moment of it lies within the run's reference stream."""
+
+    WRITTEN: ClassVar[str] = (
+        "source rows first_s last_s rate_hz jitter_s missing longest_step_s gaps gap_count gap_total_s covered "
+        "resolution resolution_unit repaired shares_time"
+    )
 
 
 @dataclass(frozen=True)
@@ -117,6 +126,20 @@ class FixFacts:
     age_s: Range | None
     white_m: float
     """Scatter from fix to fix, m per axis: what remains of their second differences."""
+
+    WRITTEN: ClassVar[str] = (
+        "qualities spans=spans_told strip stated_sigma_m stated_share satellites hdop age_s white_m spans_left_out"
+    )
+
+    @property
+    def spans_told(self) -> tuple[QualitySpan, ...]:
+        """As many stretches as a file tells."""
+        return self.spans[:SPANS_TOLD]
+
+    @property
+    def spans_left_out(self) -> int:
+        """How many more there are."""
+        return max(len(self.spans) - SPANS_TOLD, 0)
 
 
 @dataclass(frozen=True)
@@ -199,6 +222,8 @@ class ColumnFacts:
     missing: float
     """Share of the rows without a value."""
 
+    WRITTEN: ClassVar[str] = "source name *values varies missing"
+
 
 @dataclass(frozen=True)
 class Excited:
@@ -214,6 +239,8 @@ class Excited:
     units: Mapping[str, str]
     same_as: tuple[str, ...] = ()
     """Effects that look the same on this drive."""
+
+    WRITTEN: ClassVar[str] = "effect=name title shown advice expected_sigma=sigmas units same_as"
 
 
 @dataclass(frozen=True)
@@ -244,6 +271,46 @@ class Series:
 
 
 @dataclass(frozen=True)
+class VehicleFacts:
+    """The vehicle, as its file or a guess has it."""
+
+    name: str
+    declared: bool
+    """False where it is a guess."""
+    wheel_radius_m: float
+    track_m: float
+    ticks_per_rev: float | None
+    convention: str
+
+
+@dataclass(frozen=True)
+class Span:
+    """From when to when the run lasts."""
+
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class StandstillTold:
+    """What the sensors read while the robot stands, and when it does."""
+
+    facts: StandstillFacts
+    spans_s: Floats
+    """(k, 2)"""
+
+    WRITTEN: ClassVar[str] = "*facts spans_s"
+
+
+@dataclass(frozen=True)
+class ExcitedTold:
+    """What the drive shows, and by what that was asked."""
+
+    how: str | None
+    effects: tuple[Excited, ...]
+
+
+@dataclass(frozen=True)
 class Inspection:
     """One log, inspected."""
 
@@ -269,7 +336,63 @@ class Inspection:
     series: Series
     verdict: Verdict = UNJUDGED
 
+    WRITTEN: ClassVar[str] = (
+        "run path vehicle=vehicle_facts verdict calibratable unread span streams=streams_by_name fixes clock drive "
+        "standstill=standstill_told witnesses yaw_minus_course=course columns excited=excited_told findings notices"
+    )
+
     @property
     def refused(self) -> bool:
         """Whether a calibration of this log is impossible."""
         return any(one.weight == "refused" for one in self.findings)
+
+    @property
+    def calibratable(self) -> bool:
+        """Whether a calibration may begin."""
+        return not self.refused
+
+    @property
+    def vehicle_facts(self) -> VehicleFacts | None:
+        """The vehicle's sizes; None where nothing is known of it."""
+        v = self.vehicle
+        if v is None:
+            return None
+        return VehicleFacts(v.name, self.declared, v.wheel_radius_m, v.track_m, v.ticks_per_rev, v.convention)
+
+    @property
+    def span(self) -> Span:
+        """From when to when."""
+        return Span(*self.span_s)
+
+    @property
+    def streams_by_name(self) -> Mapping[str, StreamFacts]:
+        """The streams by what they are."""
+        return {one.name: one for one in self.streams}
+
+    @property
+    def standstill_told(self) -> StandstillTold | None:
+        """The standstills with their times."""
+        return None if self.standstill is None else StandstillTold(self.standstill, self.series.standing_s)
+
+    @property
+    def excited_told(self) -> ExcitedTold:
+        """What the drive shows."""
+        return ExcitedTold(self.excited_how if self.excited else None, self.excited)
+
+
+@dataclass(frozen=True)
+class InspectFailure:
+    """A run that could not be inspected."""
+
+    name: str
+    error: str
+
+
+@dataclass(frozen=True)
+class Inspections:
+    """Every run of a call, and what could not be inspected."""
+
+    runs: tuple[Inspection, ...]
+    failures: tuple[InspectFailure, ...] = ()
+
+    SCHEMA: ClassVar[str] = "sccal.inspect/1"

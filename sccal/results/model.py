@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,6 +31,39 @@ class Range:
 
 
 @dataclass(frozen=True)
+class Measured(Estimate):
+    """A parameter of an effect with its unit, "1" for ratios."""
+
+    unit: str = ""
+
+    WRITTEN: ClassVar[str] = f"{Estimate.WRITTEN} unit"
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A place, a moment or a time constant, as it was found."""
+
+    value: float
+    unit: str
+
+    WRITTEN: ClassVar[str] = "value! unit!"
+
+
+def measured(parameters: Mapping[str, Estimate], units: Mapping[str, str]) -> dict[str, Measured]:
+    """Parameters with their units."""
+    return {name: Measured(**vars(one), unit=units.get(name, "")) for name, one in parameters.items()}
+
+
+def unmeasured(found: Mapping[str, Measured]) -> tuple[dict[str, Estimate], dict[str, str]]:
+    """Parameters, and their units."""
+    estimates = {
+        name: Estimate(one.value, one.sigma, one.status, one.reason, one.nominal, one.prior_sigma)
+        for name, one in found.items()
+    }
+    return estimates, {name: one.unit for name, one in found.items()}
+
+
+@dataclass(frozen=True)
 class JudgedEffect:
     """One effect of the model."""
 
@@ -48,6 +82,57 @@ class JudgedEffect:
     column: Range | None = None
     """Of an effect that follows a logged column: where its values lie over all runs, which its numbers refer to."""
 
+    WRITTEN: ClassVar[str] = (
+        "effect=name! title! parameters=measured shapes=measured_shapes run=of_run told! prior_scale! column!"
+    )
+
+    @property
+    def measured(self) -> Mapping[str, Measured]:
+        """The parameters, each with its unit."""
+        return measured(self.parameters, self.units)
+
+    @property
+    def measured_shapes(self) -> Mapping[str, Shape]:
+        """The shapes, each with its unit."""
+        return {name: Shape(value, self.units.get(name, "")) for name, value in self.shapes.items()}
+
+    @property
+    def of_run(self) -> str | None:
+        """The run that it belongs to alone."""
+        return self.run or None
+
+    @staticmethod
+    def further(_: Mapping[str, Any], part: Any) -> dict[str, Any]:
+        """What a document tells in other words."""
+        parameters, units = unmeasured(part("parameters", Mapping[str, Measured]))
+        shapes = part("shapes", Mapping[str, Shape])
+        return {
+            "parameters": parameters,
+            "units": units | {name: one.unit for name, one in shapes.items()},
+            "shapes": {name: one.value for name, one in shapes.items()},
+            "run": part("run", str | None) or "",
+        }
+
+
+@dataclass(frozen=True)
+class RunNoise:
+    """The noise of one run with the effects in the model."""
+
+    run: str
+    noise: Noise
+
+    WRITTEN: ClassVar[str] = "run! *noise"
+
+
+@dataclass(frozen=True)
+class JudgedDrift:
+    """Drift of a model on data that fitted neither, and how it was judged."""
+
+    outage_end_rms_m: float | None
+    how: str
+
+    WRITTEN: ClassVar[str] = "outage_end_rms_m! how!"
+
 
 @dataclass(frozen=True)
 class JudgedModel:
@@ -61,3 +146,22 @@ class JudgedModel:
     outage_end_rms_m: float | None
     """Drift of the model on data that fitted neither, and how it was judged."""
     how: str
+
+    SCHEMA: ClassVar[str] = "sccal.model/1"
+    WRITTEN: ClassVar[str] = "vehicle! parameters! effects! noise held_out"
+
+    @property
+    def noise(self) -> tuple[RunNoise, ...]:
+        """The noise, run by run."""
+        return tuple(RunNoise(run, noise) for run, noise in self.noises.items())
+
+    @property
+    def held_out(self) -> JudgedDrift:
+        """How it was judged."""
+        return JudgedDrift(self.outage_end_rms_m, self.how)
+
+    @staticmethod
+    def further(_: Mapping[str, Any], part: Any) -> dict[str, Any]:
+        """What a document tells in other words."""
+        noises = {one.run: one.noise for one in part("noise", tuple[RunNoise, ...])}
+        return {"noises": noises, **vars(part("held_out", JudgedDrift))}

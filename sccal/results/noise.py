@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 
 @dataclass(frozen=True)
@@ -27,3 +28,8 @@ class Noise:
     """Median of the stated (or table) sigma of the leading fixes, which fix_scale multiplies."""
     apart_nats: float = 0.0
     """How far the two best ends of the search are apart in log-likelihood: near zero where the search is sure."""
+
+    WRITTEN: ClassVar[str] = (
+        "heading_white_rad heading_coloured_rad heading_tau_s fix_scale other_fix_scale fix_coloured_m fix_tau_s "
+        "slip_m_per_sqrt_m fix_stated_m apart_nats source"
+    )

@@ -87,6 +87,13 @@ def wrapped_deg(angle_rad: float) -> float:
     return 180.0 if wrapped <= -180.0 else wrapped
 
 
+def radians_of(angle_deg: float) -> float:
+    """Degrees to the radians that they were made of, bit for bit where math.degrees made them of any."""
+    angle_rad = math.radians(angle_deg)
+    around = (angle_rad, math.nextafter(angle_rad, math.inf), math.nextafter(angle_rad, -math.inf))
+    return next((one for one in around if math.degrees(one) == angle_deg), angle_rad)
+
+
 def duration(seconds: float | None) -> str:
     """``42 s``, ``5 min 12 s``, ``1 h 02 min``."""
     if seconds is None or not math.isfinite(seconds) or seconds < 0.0:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import ClassVar, Literal
 
 from sccal.arrays import Bools, Floats
-from sccal.results.saved import SavedEstimate
+from sccal.logs.inputs import InputFile
+from sccal.results.calibration import Estimate, Fit, Outage, Status
+from sccal.results.gates import GateResult
+from sccal.results.verdict import Verdict
 
+SUMMARY_SCHEMA = "sccal.summary/1"
 Shape = Literal["drift", "onset", "step"]
 
 
@@ -21,14 +25,31 @@ class ThinPath:
 
 
 @dataclass(frozen=True)
-class Outage:
-    """Drift without fixes, as the run's file tells it; None where no window fits into the run."""
+class InShort:
+    """An estimate, as far as a summary tells it."""
 
-    window_s: float | None
+    value: float
+    sigma: float
+    status: Status
+
+
+@dataclass(frozen=True)
+class OutageInShort:
+    """Drift without fixes; None where no window fits into the run."""
+
+    window_s: float
     windows: int
     rms_m: float | None
     end_rms_m: float | None
     percent_of_distance: float | None
+
+
+@dataclass(frozen=True)
+class InputHash:
+    """A file that a run was read from."""
+
+    name: str
+    sha256: str
 
 
 @dataclass(frozen=True)
@@ -41,23 +62,44 @@ class RunLine:
     """As in VehicleSummary.label."""
     started: str | None
     """ISO 8601; None where the log has no date."""
-    level: str
-    """``good``, ``partial`` or ``doubtful``."""
-    verdict: str
-    """The level, a colon and why."""
-    duration_s: float | None
-    distance_m: float | None
-    parameters: Mapping[str, SavedEstimate]
-    effects: Mapping[str, Mapping[str, SavedEstimate]]
-    fit: Mapping[str, Any]
-    """Numbers by name, as in calibration.json."""
+    verdict: Verdict
+    duration_s: float
+    distance_m: float
+    parameters: Mapping[str, Estimate]
+    effects: Mapping[str, Mapping[str, Estimate]]
+    fit: Fit
     outage: Outage
     warnings: tuple[str, ...]
-    inputs: tuple[tuple[str, str], ...]
-    """Name and SHA-256 of each file that the run was read from."""
+    inputs: tuple[InputFile, ...]
     versions: Mapping[str, str]
     """Of sccal and of the libraries that computed the run."""
     path: ThinPath
+
+    WRITTEN: ClassVar[str] = (
+        "run vehicle started verdict duration_s distance_m parameters=parameters_in_short effects=effects_in_short fit "
+        "outage=outage_in_short warnings results=run inputs=hashes"
+    )
+
+    @property
+    def parameters_in_short(self) -> Mapping[str, InShort]:
+        """The parameters, as far as a summary tells them."""
+        return _in_short(self.parameters)
+
+    @property
+    def effects_in_short(self) -> Mapping[str, Mapping[str, InShort]]:
+        """The effects, as far as a summary tells them."""
+        return {effect: _in_short(named) for effect, named in self.effects.items()}
+
+    @property
+    def outage_in_short(self) -> OutageInShort:
+        """The drift without its windows."""
+        o = self.outage
+        return OutageInShort(o.window_s, o.count, o.rms_m, o.end_rms_m, o.percent_of_distance)
+
+    @property
+    def hashes(self) -> tuple[InputHash, ...]:
+        """The files that the run was read from."""
+        return tuple(InputHash(one.name, one.sha256) for one in self.inputs)
 
 
 @dataclass(frozen=True)
@@ -89,6 +131,26 @@ class Trend:
     """Between the two runs; None for a chart by order."""
     fitted: Floats
     """(n,) of the chart's runs."""
+    sentence: str = ""
+    """The change in words, where a report has put them."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A trend by the names of its runs."""
+
+    shape: Shape
+    value: float
+    sigma: float
+    days: float | None
+    from_run: str
+    to_run: str
+    from_date: str | None
+    to_date: str | None
+    p_value: float
+    sentence: str
+
+    WRITTEN: ClassVar[str] = "shape value sigma days from_run to_run from=from_date to=to_date p_value sentence"
 
 
 @dataclass(frozen=True)
@@ -124,6 +186,37 @@ class Chart:
     trend: Trend | None
     """None where nothing changes beyond chance."""
 
+    WRITTEN: ClassVar[str] = (
+        "parameter=key by runs centre scatter lower upper outside=runs_outside set_aside=runs_set_aside left_out "
+        "tested change"
+    )
+
+    @property
+    def by(self) -> Literal["date", "order"]:
+        """What the runs stand by."""
+        return "date" if self.by_date else "order"
+
+    @property
+    def runs_outside(self) -> tuple[str, ...]:
+        """Names of those beyond the limits."""
+        return tuple(run for run, outside in zip(self.runs, self.outside, strict=True) if outside)
+
+    @property
+    def runs_set_aside(self) -> tuple[str, ...]:
+        """Names of those that do not take part."""
+        return tuple(run for run, aside in zip(self.runs, self.set_aside, strict=True) if aside)
+
+    @property
+    def change(self) -> Change | None:
+        """What changes, by the names of the runs."""
+        t = self.trend
+        if t is None:
+            return None
+        begun = self.started if self.by_date else (None,) * len(self.runs)
+        between = self.runs[t.before], self.runs[t.after]
+        dates = begun[t.before], begun[t.after]
+        return Change(t.shape, t.change, t.sigma, t.days, *between, *dates, t.p_value, t.sentence)
+
 
 @dataclass(frozen=True)
 class NoChart:
@@ -131,6 +224,8 @@ class NoChart:
 
     key: str
     reason: str
+
+    WRITTEN: ClassVar[str] = "parameter=key no_chart=reason"
 
 
 @dataclass(frozen=True)
@@ -141,12 +236,29 @@ class VehicleSummary:
     """Its name; with a number behind where several vehicles of different settings share it."""
     file: str | None
     """Name of its JSON file in the folder of results; None where it has none."""
-    verdict: str
-    parameters: Mapping[str, SavedEstimate]
+    verdict: Verdict | None
+    parameters: Mapping[str, Estimate]
     """Of all runs as one problem; empty without a file."""
     runs: int
     charts: tuple[Chart, ...]
     no_charts: tuple[NoChart, ...]
+
+    WRITTEN: ClassVar[str] = "vehicle=label file verdict=verdict_text runs parameters=parameters_in_short trends"
+
+    @property
+    def verdict_text(self) -> str:
+        """Empty without a file."""
+        return str(self.verdict or "")
+
+    @property
+    def parameters_in_short(self) -> Mapping[str, InShort]:
+        """The parameters, as far as a summary tells them."""
+        return _in_short(self.parameters)
+
+    @property
+    def trends(self) -> tuple[Chart | NoChart, ...]:
+        """Every parameter with its chart, then those without one."""
+        return (*self.charts, *self.no_charts)
 
 
 @dataclass(frozen=True)
@@ -171,3 +283,11 @@ class Summary:
     failures: tuple[FailedRun, ...]
     vehicles: tuple[VehicleSummary, ...]
     totals: Totals
+    gates: tuple[GateResult, ...] = ()
+
+    SCHEMA: ClassVar[str] = SUMMARY_SCHEMA
+    WRITTEN: ClassVar[str] = "totals runs failures vehicles gates"
+
+
+def _in_short(estimates: Mapping[str, Estimate]) -> dict[str, InShort]:
+    return {key: InShort(one.value, one.sigma, one.status) for key, one in estimates.items()}

@@ -21,7 +21,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats
 from sccal.logs.names import natural_key
-from sccal.results.saved import PARAMETERS, Saved, SavedEstimate
+from sccal.results.calibration import PARAMETERS, Calibration, Estimate, named_estimates
 from sccal.results.summary import Chart, NoChart
 from sccal.summary.trends import MEDIAN_OF_A_NORMAL, best_trend, on_all_runs
 
@@ -40,30 +40,29 @@ _SECONDS_PER_DAY = 86400.0
 
 @dataclass(frozen=True)
 class DatedRun:
-    """A run as its file tells it."""
+    """A run and when it started."""
 
-    saved: Saved
+    run: Calibration
     started: str | None
     started_s: float | None
     """Unix time; None without a date."""
 
 
-def dated(saved: Saved) -> DatedRun:
+def dated(run: Calibration) -> DatedRun:
     """A run and when it started; a date that cannot be read is none."""
-    text = saved.document.get("started")
     try:
-        moment = datetime.fromisoformat(str(text))
+        moment = datetime.fromisoformat(str(run.started))
         moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-        return DatedRun(saved, str(text), moment.timestamp())
-    except (TypeError, ValueError, OverflowError):
-        return DatedRun(saved, None, None)
+        return DatedRun(run, run.started, moment.timestamp())
+    except (ValueError, OverflowError):
+        return DatedRun(run, None, None)
 
 
 def charts_of(runs: Sequence[DatedRun]) -> tuple[list[Chart], list[NoChart]]:
     """Every parameter of one vehicle that enough runs estimated; effects after the four of the model."""
     charts: list[Chart] = []
     without: list[NoChart] = []
-    of_run = [_flat(run.saved) for run in runs]
+    of_run = [_flat(run.run) for run in runs]
     keys = dict.fromkeys([*PARAMETERS, *(key for estimates in of_run for key in estimates)])
     for key in keys:
         if key.endswith("at_s"):
@@ -119,12 +118,12 @@ def weighted_median(value: Floats, weight: Floats) -> float:
     return float(value[order[first : first + 1 + at_half]].mean())
 
 
-def _chart(key: str, runs: Sequence[tuple[DatedRun, SavedEstimate]], of_all: int) -> Chart | NoChart:
+def _chart(key: str, runs: Sequence[tuple[DatedRun, Estimate]], of_all: int) -> Chart | NoChart:
     dates = [run for run in runs if run[0].started_s is not None]
     moments_s = [run.started_s for run, _ in dates if run.started_s is not None]
     by_date = len(dates) >= max(FEWEST_RUNS, len(runs) / 2) and max(moments_s) - min(moments_s) > SHORTEST_SPAN_S
     if by_date:
-        runs = sorted(dates, key=lambda run: (run[0].started_s or 0.0, natural_key(PurePosixPath(run[0].saved.run))))
+        runs = sorted(dates, key=lambda run: (run[0].started_s or 0.0, natural_key(PurePosixPath(run[0].run.run))))
     if len(runs) < FEWEST_RUNS:
         return NoChart(key, f"{len(runs)} of {of_all} runs estimated it; a chart needs {FEWEST_RUNS}")
     value = np.array([estimate.value for _, estimate in runs])
@@ -145,7 +144,7 @@ def _chart(key: str, runs: Sequence[tuple[DatedRun, SavedEstimate]], of_all: int
     trend = best_trend(at[used], value[used], sigma[used], by_date)
     return Chart(
         key=key,
-        runs=tuple(run.saved.run for run, _ in runs),
+        runs=tuple(dated_run.run.run for dated_run, _ in runs),
         started=tuple(run.started for run, _ in runs),
         by_date=by_date,
         at=at,
@@ -170,12 +169,13 @@ def on_one_turn_deg(value_deg: Floats) -> Floats:
     return mean_deg + np.remainder(value_deg - mean_deg + 180.0, 360.0) - 180.0
 
 
-def _flat(saved: Saved) -> Mapping[str, SavedEstimate]:
-    effects = {f"{effect}.{name}": one for effect, named in saved.effects.items() for name, one in named.items()}
-    return {**saved.parameters, **effects}
+def _flat(run: Calibration) -> Mapping[str, Estimate]:
+    return {
+        name.removeprefix("parameters.").removeprefix("effects."): one for name, one in named_estimates(run).items()
+    }
 
 
-def _usable(estimate: SavedEstimate) -> bool:
+def _usable(estimate: Estimate) -> bool:
     return (
         estimate.status == "estimated"
         and math.isfinite(estimate.value)

@@ -5,11 +5,13 @@ The rule is that of Ramer (1972) and of Douglas and Peucker (1973), all pieces o
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
-from sccal.results.saved import Saved, read_trajectory
+from sccal.results.files import read_trajectory
 from sccal.results.summary import ThinPath
 
 ROWS_READ = 600
@@ -18,10 +20,10 @@ TOLERANCE = 1 / 250
 """Of the path's larger extent: under half a pixel where the picture is drawn."""
 
 
-def thin_path(saved: Saved, most: int) -> ThinPath:
-    """At most so many corners of a run's path; none where its trajectory is missing or damaged."""
+def thin_path(folder: Path, most: int) -> ThinPath:
+    """At most so many corners of the path in a folder of results; none where its trajectory is missing or damaged."""
     try:
-        path = read_trajectory(saved.path.parent, ROWS_READ)
+        path = read_trajectory(folder, ROWS_READ)
     except DataError:
         return ThinPath(np.empty(0), np.empty(0))
     usable = np.isfinite(path.east_m) & np.isfinite(path.north_m)

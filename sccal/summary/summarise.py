@@ -1,17 +1,16 @@
-"""From the files of many results to one summary; each trajectory is thinned while it is read."""
+"""From many results to one summary; each trajectory is thinned while it is read from its file."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import PurePosixPath
-from typing import Any
+from pathlib import Path, PurePosixPath
 
 from sccal.errors import Failure
 from sccal.logs.names import natural_key
-from sccal.results.saved import Saved
-from sccal.results.summary import Chart, FailedRun, NoChart, Outage, RunLine, Summary, Totals, VehicleSummary
+from sccal.results.calibration import Calibration, VehicleCalibration
+from sccal.results.summary import Chart, FailedRun, NoChart, RunLine, Summary, ThinPath, Totals, VehicleSummary
 from sccal.summary.charts import DatedRun, charts_of, dated
 from sccal.summary.paths import thin_path
 from sccal.summary.trends import significant
@@ -20,19 +19,24 @@ MOST_CORNERS = 160
 """Of one path."""
 CORNERS_IN_ALL = 100_000
 """Of all paths; what keeps a page of a thousand runs small."""
+_Stored = tuple[str, VehicleCalibration]
+"""A file's name and what stands in it."""
+_Members = tuple[_Stored | None, list[DatedRun]]
 
 
-def summarise(runs: Sequence[Saved], vehicles: Sequence[Saved], failures: Sequence[Failure]) -> Summary:
-    """The summary of a batch: results of runs and of vehicles as read again, and what gave no result.
+def summarise(
+    runs: Sequence[Calibration], vehicles: Mapping[str, VehicleCalibration], failures: Sequence[Failure], out: Path
+) -> Summary:
+    """The summary of a batch: runs, vehicles by the names of their files in ``out``, and what gave no result.
 
     A run belongs to the vehicle whose file names it, else to those of the same name. Runs and failures come out in
     the order of their names, whatever the order in which they were done.
     """
-    ordered = [dated(saved) for saved in sorted(runs, key=lambda saved: natural_key(PurePosixPath(saved.run)))]
+    ordered = [dated(run) for run in sorted(runs, key=lambda run: natural_key(PurePosixPath(run.run)))]
     members = _by_vehicle(ordered, vehicles)
-    label_of = {run.saved.run: label for label, (_, its_runs) in members.items() for run in its_runs}
+    label_of = {run.run.run: label for label, (_, its_runs) in members.items() for run in its_runs}
     most = max(8, min(MOST_CORNERS, CORNERS_IN_ALL // max(len(ordered), 1)))
-    lines = tuple(_line(run, label_of[run.saved.run], most) for run in ordered)
+    lines = tuple(_line(run, label_of[run.run.run], thin_path(out / run.run.run, most)) for run in ordered)
     charts = {label: charts_of(its_runs) for label, (_, its_runs) in members.items()}
     told = _told([chart for made, _ in charts.values() for chart in made])
     return Summary(
@@ -52,28 +56,29 @@ def summarise(runs: Sequence[Saved], vehicles: Sequence[Saved], failures: Sequen
     )  # fmt: skip
 
 
-def _by_vehicle(runs: Sequence[DatedRun], vehicles: Sequence[Saved]) -> dict[str, tuple[Saved | None, list[DatedRun]]]:
+def _by_vehicle(runs: Sequence[DatedRun], vehicles: Mapping[str, VehicleCalibration]) -> dict[str, _Members]:
     """By a label of each vehicle: its file and its runs."""
-    groups: list[tuple[str, Saved | None, list[DatedRun]]] = []
+    groups: list[tuple[str, _Stored | None, list[DatedRun]]] = []
     of_run: dict[str, int] = {}
-    for file in sorted(vehicles, key=lambda saved: (saved.vehicle, saved.path.name)):
-        of_run.update({str(one.get("run")): len(groups) for one in file.document.get("runs") or []})
-        groups.append((file.vehicle, file, []))
+    for file, vehicle in sorted(vehicles.items(), key=lambda stored: (stored[1].vehicle.name, stored[0])):
+        of_run |= {one.run: len(groups) for one in vehicle.runs}
+        groups.append((vehicle.vehicle.name, (file, vehicle), []))
     without_file: dict[str, int] = {}
     for run in runs:
-        place = of_run.get(run.saved.run)
+        place = of_run.get(run.run.run)
         if place is None:
-            place = without_file.setdefault(run.saved.vehicle, len(groups))
+            name = run.run.vehicle.name
+            place = without_file.setdefault(name, len(groups))
             if place == len(groups):
-                groups.append((run.saved.vehicle, None, []))
+                groups.append((name, None, []))
         groups[place][2].append(run)
-    labelled: dict[str, tuple[Saved | None, list[DatedRun]]] = {}
-    for name, its_file, its_runs in groups:
+    labelled: dict[str, _Members] = {}
+    for name, stored, its_runs in groups:
         count, label = 1, name
         while label in labelled:
             count += 1
             label = f"{name} ({count})"
-        labelled[label] = its_file, its_runs
+        labelled[label] = stored, its_runs
     return labelled
 
 
@@ -85,70 +90,47 @@ def _told(charts: Sequence[Chart]) -> dict[int, Chart]:
 
 
 def _vehicle(
-    label: str, file: Saved | None, runs: int, charts: Sequence[Chart], no_charts: Sequence[NoChart]
+    label: str, stored: _Stored | None, runs: int, charts: Sequence[Chart], no_charts: Sequence[NoChart]
 ) -> VehicleSummary:
     return VehicleSummary(
         label=label,
-        file=None if file is None else file.path.name,
-        verdict="" if file is None else file.verdict,
-        parameters={} if file is None else file.parameters,
+        file=None if stored is None else stored[0],
+        verdict=None if stored is None else stored[1].verdict,
+        parameters={} if stored is None else stored[1].parameters.by_key,
         runs=runs,
         charts=tuple(charts),
         no_charts=tuple(no_charts),
     )
 
 
-def _line(run: DatedRun, vehicle: str, most_corners: int) -> RunLine:
-    document = run.saved.document
-    drive, outage = _block(document, "drive"), _block(document, "outage")
-    provenance = _block(document, "provenance")
-    windows = _finite(outage.get("windows"))
+def _line(dated_run: DatedRun, vehicle: str, path: ThinPath) -> RunLine:
+    run = dated_run.run
     return RunLine(
-        run=run.saved.run,
+        run=run.run,
         vehicle=vehicle,
-        started=run.started,
-        level=run.saved.verdict.partition(":")[0],
-        verdict=run.saved.verdict,
-        duration_s=_finite(drive.get("duration_s")),
-        distance_m=_finite(drive.get("distance_m")),
-        parameters=run.saved.parameters,
-        effects=run.saved.effects,
-        fit=_block(document, "fit"),
-        outage=Outage(
-            window_s=_finite(outage.get("window_s")),
-            windows=0 if windows is None else int(windows),
-            rms_m=_finite(outage.get("rms_m")),
-            end_rms_m=_finite(outage.get("end_rms_m")),
-            percent_of_distance=_finite(outage.get("percent_of_distance")),
-        ),
-        warnings=tuple(
-            str(notice.get("text", ""))
-            for notice in document.get("notices") or []
-            if notice.get("severity") == "warning"
-        ),
-        inputs=tuple((str(one.get("name")), str(one.get("sha256"))) for one in provenance.get("inputs") or []),
-        versions={str(name): str(version) for name, version in _block(provenance, "versions").items()},
-        path=thin_path(run.saved, most_corners),
+        started=dated_run.started,
+        verdict=run.verdict,
+        duration_s=run.drive.duration_s,
+        distance_m=run.drive.distance_m,
+        parameters=run.parameters.by_key,
+        effects=run.effects,
+        fit=run.fit,
+        outage=run.outage,
+        warnings=tuple(str(notice) for notice in run.notices if notice.severity == "warning"),
+        inputs=() if run.provenance is None else run.provenance.inputs,
+        versions={} if run.provenance is None else run.provenance.versions,
+        path=path,
     )
 
 
 def _totals(lines: Sequence[RunLine], failed: int) -> Totals:
-    levels = [line.level for line in lines]
+    levels = [line.verdict.level for line in lines]
     return Totals(
         runs=len(lines) + failed,
         good=levels.count("good"),
         partial=levels.count("partial"),
-        doubtful=len(levels) - levels.count("good") - levels.count("partial"),
+        doubtful=levels.count("doubtful"),
         failed=failed,
-        duration_s=math.fsum(line.duration_s or 0.0 for line in lines),
-        distance_m=math.fsum(line.distance_m or 0.0 for line in lines),
+        duration_s=math.fsum(line.duration_s for line in lines),
+        distance_m=math.fsum(line.distance_m for line in lines),
     )
-
-
-def _block(document: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    block = document.get(key)
-    return block if isinstance(block, Mapping) else {}
-
-
-def _finite(number: object) -> float | None:
-    return float(number) if isinstance(number, int | float) and math.isfinite(number) else None

@@ -35,7 +35,7 @@ def test_a_bug_in_one_run_leaves_the_others_their_results(tmp_path, monkeypatch,
     monkeypatch.setattr(tasks, "calibrate_run", buggy)
     found, told = run([tmp_path / "logs"], tmp_path / "out")
     assert [name for name, _ in told] == ["a", "b", "c"]
-    assert [one.run for one in found.calibrated] == ["a", "c"]
+    assert [one.run for one in found.runs] == ["a", "c"]
     assert found.failures[0].error.exit_code == Exit.INTERNAL
     assert "ZeroDivisionError" in capsys.readouterr().err
     assert (tmp_path / "out" / "c" / "calibration.json").is_file()

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from sccal.calibration.judged_model import read_judged_model
 from sccal.effects.catalogue import CATALOGUE, parse_effect
-from sccal.report.as_json import json_text
-from sccal.report.model_json import model_json, read_model
 from sccal.results.calibration import Estimate
+from sccal.results.converter import document_of, json_text
 from sccal.results.model import JudgedEffect
 from sccal.simulate.choose import settings_from
 from sccal.simulate.files import write_run, write_vehicle_file
@@ -96,9 +96,9 @@ def test_the_model_is_part_of_what_a_result_is_made_from(one):
     again = sccal("calibrate", tmp / "logs", "--model", model, "--out", tmp / "out", "--resume")
     assert "1 of 1 results stood already" in again.out
     other = tmp / "other.json"
-    read = read_model(model)
+    read = read_judged_model(model)
     noises = {run: replace(noise, fix_scale=1.1 * noise.fix_scale) for run, noise in read.noises.items()}
-    other.write_text(json_text(model_json(replace(read, noises=noises))))
+    other.write_text(json_text(document_of(replace(read, noises=noises))))
     again = sccal("calibrate", tmp / "logs", "--model", other, "--out", tmp / "out2", "--resume")
     assert again.code == 0
     again = sccal("calibrate", tmp / "logs", "--model", model, "--out", tmp / "out2", "--resume")
@@ -124,9 +124,9 @@ def with_effect(model: Path, folder: Path, run: str) -> Path:
         {"at_s": 80.0},
         run,
     )
-    read = read_model(model)
+    read = read_judged_model(model)
     path = folder / "with-step.json"
-    path.write_text(json_text(model_json(replace(read, effects=(effect, *read.effects)))))
+    path.write_text(json_text(document_of(replace(read, effects=(effect, *read.effects)))))
     return path
 
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sccal.compare.calibrations import compare_calibrations
-from sccal.report.compare_json import compare_json
 from sccal.report.compare_text import compare_text, headline
+from sccal.results.converter import document_of
 from tests.results.documents import calibration, estimate, saved, vehicle
 
 SIGMAS = st.floats(1e-4, 1e-2)
@@ -110,7 +110,7 @@ def test_the_text_gives_the_change_first():
 
 def test_the_json_is_the_same_comparison():
     a, b = calibration(track_m=estimate(0.70, 3e-3)), calibration(track_m=estimate(0.71, 4e-3))
-    document = compare_json(compare_calibrations(saved(a), saved(b), 1.0))
+    document = document_of(compare_calibrations(saved(a), saved(b), 1.0))
     assert (document["schema"], document["kind"]) == ("sccal.comparison/1", "calibration")
     assert document["changed"] == ["parameters.track_m"]
     track = next(one for one in document["parameters"] if one["name"] == "parameters.track_m")

@@ -7,9 +7,9 @@ from typer.testing import CliRunner
 
 from sccal.cli import app as application
 from sccal.errors import DataError, SccalError, UsageError
-from sccal.report.as_json import json_text
-from sccal.report.diagnosis_json import diagnosis_json
-from tests.compare.test_diagnoses import ARM, diagnosis
+from sccal.results.converter import document_of, json_text
+from tests.compare.test_diagnoses import ARM
+from tests.compare.test_diagnoses import document as diagnosis
 from tests.results.documents import calibration, estimate, stored, vehicle
 
 app = application
@@ -30,7 +30,7 @@ def results(tmp_path):
     stored(tmp_path / "out", vehicle(), "vehicle.json")
     for name, document in (("d1", diagnosis()), ("d2", diagnosis(ARM))):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "diagnosis.json").write_text(json.dumps(document.document))
+        (tmp_path / name / "diagnosis.json").write_text(json.dumps(document))
     return tmp_path
 
 
@@ -94,7 +94,7 @@ def test_nothing_estimated_in_both_cannot_support_an_answer(results):
 def test_what_diagnose_writes_can_be_compared(results, tmp_path):
     from tests.report.test_diagnosis_report import diagnosis as reported
 
-    document = json_text(diagnosis_json(reported()))
+    document = json_text(document_of(reported()))
     (tmp_path / "real.json").write_text(document)
     code, printed = call(tmp_path / "real.json", tmp_path / "real.json", "--fail-on-change")
     assert code == 0

@@ -1,13 +1,11 @@
 """Two diagnosed models side by side."""
 
-from pathlib import Path
-
 import pytest
 
 from sccal.compare.diagnoses import compare_diagnoses
-from sccal.report.compare_json import compare_json
 from sccal.report.compare_text import compare_text, headline
-from sccal.results.saved_diagnosis import SavedDiagnosis
+from sccal.results.converter import document_of, result_from
+from sccal.results.diagnosis import Diagnosis
 
 _JUDGED = {
     "outage_rms_m": 0.9,
@@ -29,20 +27,20 @@ def finding(effect, rivals=(), nats=100.0, **parameters):
 
 
 def diagnosis(*findings, runs=("a",), **more):
-    return SavedDiagnosis(
-        Path("out/diagnosis.json"),
-        {
-            "schema": "sccal.diagnosis/1",
-            "runs": list(runs),
-            "findings": list(findings),
-            "not_excited": [],
-            "before": dict(_JUDGED),
-            "after": _JUDGED | {"outage_end_rms_m": 0.7},
-            "held_out": {"how": "…"},
-            "unexplained": {"significant": False, "port": None, "depends_on": None, "variance_fraction": 0},
-        }
-        | more,
-    )
+    return result_from(document(*findings, runs=runs, **more), Diagnosis)
+
+
+def document(*findings, runs=("a",), **more):
+    return {
+        "schema": "sccal.diagnosis/1",
+        "runs": list(runs),
+        "findings": list(findings),
+        "not_excited": [],
+        "before": dict(_JUDGED),
+        "after": _JUDGED | {"outage_end_rms_m": 0.7},
+        "held_out": {"how": "…"},
+        "unexplained": {"significant": False, "port": None, "depends_on": None, "variance_fraction": 0},
+    } | more
 
 
 ARM = finding("lever_arm", forward_m=(-0.4, 0.2), left_m=(-0.72, 0.05))
@@ -119,7 +117,7 @@ def test_text_and_json_tell_the_same():
     comparison = compare_diagnoses(diagnosis(ARM), diagnosis(), 3.0)
     text = compare_text(comparison, 80)
     assert "lever_arm     100       -  lost" in text
-    document = compare_json(comparison)
+    document = document_of(comparison)
     assert document["findings"][0] == {
         "effect": "lever_arm",
         "change": "lost",

@@ -14,7 +14,7 @@ from sccal.cli import main
 from sccal.cli.app import app
 from sccal.export.catalogue import FORMATS
 from sccal.export.result import read_result
-from sccal.report.as_json import json_text
+from sccal.results.converter import document_of, json_text
 
 PAGE = Path(sccal.__file__).parents[1] / "docs" / "export.md"
 EXAMPLES = [
@@ -41,7 +41,9 @@ def out(enu_robot, tmp_path, monkeypatch):
     (folder / "monday").mkdir(parents=True)
     for file in enu_robot.results.iterdir():
         (folder / "monday" / file.name).write_bytes(file.read_bytes())
-    document = enu_robot.exported.saved.document | {"run": "(vehicle)", "runs": [{}, {}]}
+    run = document_of(enu_robot.exported.run)
+    in_short = [{key: run[key] for key in ("run", "verdict", "parameters")}] * 2
+    document = run | {"run": "(vehicle)", "runs": in_short}
     (folder / "vehicle.json").write_text(json_text(document))
     monkeypatch.chdir(tmp_path)
     return folder

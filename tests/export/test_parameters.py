@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from sccal.export.catalogue import FORMATS, format_named, left_out
 from sccal.export.result import Result
 from sccal.export.robot_localization import write_robot_localization
 from sccal.export.ros2_control import write_ros2_control
-from sccal.results.saved import Saved
+from sccal.results.calibration import Estimate
 
 
 def loaded(text):
@@ -27,13 +28,12 @@ def loaded(text):
 
 def altered(result: Result, key: str, **block) -> Result:
     """With one parameter, or ``effect/parameter``, told otherwise."""
-    document = json.loads(json.dumps(result.saved.document))
-    blocks = document["parameters"]
+    block = {name: math.nan if value is None else value for name, value in block.items()}
     if "/" in key:
-        effect, key = key.split("/")
-        blocks = document["effects"][effect]
-    blocks[key] |= block
-    return Result(Saved(result.saved.path, document))
+        effect, name = key.split("/")
+        named = result.effects[effect]
+        return replace(result, effects={**result.effects, effect: {**named, name: replace(named[name], **block)}})
+    return replace(result, parameters={**result.parameters, key: replace(result.parameters[key], **block)})
 
 
 UNSEEN = {"status": "unobserved", "reason": "drive turns"}
@@ -45,7 +45,7 @@ def test_ros2_control_is_the_runs_own_file(enu_robot, ned_robot, straight_robot)
 
 
 def test_ros2_control_of_a_line_keeps_the_track(straight_robot):
-    assert straight_robot.exported.saved.parameters["track_m"].status == "unobserved"
+    assert straight_robot.exported.parameters["track_m"].status == "unobserved"
     text = write_ros2_control(straight_robot.exported)
     assert yaml.safe_load(text)["diff_drive_controller"]["ros__parameters"]["wheel_separation_multiplier"] == 1.0
     assert re.search(r"wheel_separation_multiplier: 1\.0  # not observed in this data: \w", text)
@@ -123,9 +123,9 @@ def test_ardupilot_leaves_alone_what_was_not_estimated(enu_robot, key, names, st
     ],
 )
 def test_ardupilot_takes_an_age_of_the_fixes_that_is_sure(enu_robot, age, says, set_ms):
-    document = json.loads(json.dumps(enu_robot.exported.saved.document))
-    document["effects"]["gnss_latency"] = {"s": {"status": "estimated", "reason": "", "nominal": None, **age}}
-    text = write_ardupilot(Result(Saved(enu_robot.exported.saved.path, document)))
+    latency = {"s": Estimate(**{"status": "estimated", **age})}
+    result = enu_robot.exported
+    text = write_ardupilot(replace(result, effects={**result.effects, "gnss_latency": latency}))
     assert says in text
     assert loaded(text).get("GPS1_DELAY_MS") == set_ms
 
@@ -159,6 +159,5 @@ def test_what_no_format_holds_is_told(enu_robot):
 
 
 def test_a_doubtful_result_is_told(enu_robot):
-    document = enu_robot.exported.saved.document | {"verdict": "doubtful: no fixes"}
-    told = left_out(format_named("gpx"), Result(Saved(enu_robot.results, document)))
+    told = left_out(format_named("gpx"), replace(enu_robot.exported, verdict="doubtful: no fixes"))
     assert told == ["the result is doubtful: no fixes"]

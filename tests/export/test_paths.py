@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
+from pathlib import Path
 from xml.etree import ElementTree
 
 import gpxpy
@@ -21,7 +23,8 @@ from sccal.export.gpx import write_gpx
 from sccal.export.kml import write_kml
 from sccal.export.result import Result, wrapped_lon_deg
 from sccal.export.tum import write_tum
-from sccal.results.saved import Saved, SavedTrajectory
+from sccal.results.calibration import Origin, Trajectory
+from tests.results.documents import calibration, retold, saved
 
 KML = "{http://www.opengis.net/kml/2.2}"
 GX = "{http://www.google.com/kml/ext/2.2}"
@@ -55,8 +58,9 @@ def placed(lat_deg, lon_deg, east_m, north_m, alt_m=0.0, **document):
     east, north = np.asarray(east_m, dtype=float), np.asarray(north_m, dtype=float)
     zero = np.zeros(east.size)
     origin = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m}
-    result = Result(Saved(None, {"run": "r", "vehicle": "v", "origin": origin} | document))
-    result.__dict__["trajectory"] = SavedTrajectory(np.arange(east.size) * 0.1, east, north, zero, zero, zero, zero)
+    run = retold(saved(calibration("r", "v")), **{"origin": origin, "started": None, "clock": None} | document)
+    result = Result.of(run, Path("calibration.json"))
+    result.__dict__["trajectory"] = Trajectory(np.arange(east.size) * 0.1, east, north, zero, zero, zero, zero)
     return result
 
 
@@ -64,7 +68,7 @@ def placed(lat_deg, lon_deg, east_m, north_m, alt_m=0.0, **document):
 def test_the_path_stands_where_pyproj_puts_it(enu_robot, write, line_of):
     result = enu_robot.exported
     lon, lat = line_of(write(result))
-    origin, path = result.saved.document["origin"], result.trajectory
+    origin, path = vars(result.run.origin), result.trajectory
     assert origin["alt_m"] == pytest.approx(800.0, abs=5.0)
     ecef = Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True)
     centre = np.array(ecef.transform(origin["lon_deg"], origin["lat_deg"], origin["alt_m"]))
@@ -245,20 +249,22 @@ def test_tum_is_that_of_the_run(enu_robot):
 
 def test_a_vehicle_has_no_path(enu_robot):
     result = enu_robot.exported
-    vehicle = Result(replace(result.saved, document=result.saved.document | {"run": "(vehicle)", "runs": []}))
+    vehicle = replace(result, run=None)
     for write in (write_geojson, write_kml, write_gpx, write_tum):
         with pytest.raises(UsageError, match="runs together have no path"):
             write(vehicle)
 
 
-@pytest.mark.parametrize(
-    "origin", [None, {}, {"lat_deg": 48.0}, {"lat_deg": None, "lon_deg": 11.0}, {"lat_deg": 91.0, "lon_deg": 0.0}, 3]
-)
+NOWHERE = math.nan
+
+
+@pytest.mark.parametrize("origin", [Origin(NOWHERE, NOWHERE), Origin(48.0, NOWHERE), Origin(91.0, 0.0)])
 def test_a_place_that_is_none_is_refused(origin):
     result = placed(0.0, 0.0, [0.0, 1.0], [0.0, 1.0])
-    result.saved.document["origin"] = origin
+    elsewhere = replace(result, run=replace(result.run, origin=origin))
+    elsewhere.__dict__["trajectory"] = result.trajectory
     with pytest.raises(DataError, match="origin"):
-        write_geojson(result)
+        write_geojson(elsewhere)
 
 
 @pytest.mark.filterwarnings("ignore:loadtxt")
@@ -268,6 +274,6 @@ def test_a_path_without_places_is_refused(enu_robot, tmp_path, rows, says):
     (tmp_path / "calibration.json").write_bytes((source / "calibration.json").read_bytes())
     header = (source / "trajectory.csv").read_text().partition("\n")[0]
     (tmp_path / "trajectory.csv").write_text(f"{header}\n{rows}")
-    result = Result(replace(enu_robot.exported.saved, path=tmp_path / "calibration.json"))
+    result = replace(enu_robot.exported, path=tmp_path / "calibration.json")
     with pytest.raises(DataError, match=says):
         write_tum(result)

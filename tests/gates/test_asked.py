@@ -8,9 +8,9 @@ from tests.results.documents import calibration, estimate, saved, stored, vehicl
 
 
 def test_gates_and_drift_are_judged_together(tmp_path):
-    before = stored(tmp_path, vehicle(), "vehicle.json")
-    asked = read_asked(["verdict==good"], before.path, ["2sigma"], ())
-    before.path.unlink()
+    stored(tmp_path, vehicle(), "vehicle.json")
+    asked = read_asked(["verdict==good"], tmp_path / "vehicle.json", ["2sigma"], ())
+    (tmp_path / "vehicle.json").unlink()
     judged = asked.judge([saved(calibration("new", track_m=estimate(0.8, 1e-3)))], [saved(vehicle())])
     assert (judged[0].expression, judged[0].outcome) == ("verdict==good", "passed")
     assert [one.run for one in judged if one.outcome == "failed"] == ["new"]
@@ -18,8 +18,8 @@ def test_gates_and_drift_are_judged_together(tmp_path):
 
 
 def test_a_baseline_alone_allows_three_sigma(tmp_path):
-    before = stored(tmp_path, calibration())
-    (allowance,) = read_asked([], before.path, [], ()).allowances
+    stored(tmp_path, calibration())
+    (allowance,) = read_asked([], tmp_path, [], ()).allowances
     assert (allowance.amount, allowance.unit) == (3.0, "sigma")
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sccal.errors import DataError, UsageError
 from sccal.gates.allowance import parse_allowance
 from sccal.gates.baseline import Baseline, Earlier, judge_drift, read_baseline
-from sccal.results.saved import SavedEstimate
+from sccal.results.calibration import Estimate
 from tests.results.documents import calibration, estimate, saved, stored, vehicle
 
 SIZES = st.floats(1e-4, 1e-2)
@@ -65,7 +65,7 @@ def test_what_is_no_allowance_is_refused(text):
 
 @given(SIZES, SIZES, st.floats(-0.05, 0.05), st.floats(0.5, 5.0))
 def test_sigmas_are_of_both_together(before, after, moved, allowed):
-    earlier = Earlier("yard", "demo", {"parameters.track_m": SavedEstimate(0.7, before, "estimated")})
+    earlier = Earlier("yard", "demo", {"parameters.track_m": Estimate(0.7, before, "estimated")})
     judged = judge_drift(
         Baseline(Path("previous.json"), (earlier,)),
         [parse_allowance(f"{allowed!r}sigma")],
@@ -200,8 +200,8 @@ def test_a_folder_gives_what_it_holds(tmp_path):
         ("[]", "schema is None"),
         ('{"schema": "sccal.diagnosis/1"}', "sccal.diagnosis/1"),
         ('{"schema": "sccal.calibration/1"}', "calibrate again"),
-        ('{"schema": "sccal.summary/1", "runs": [{"parameters": {}}]}', "vehicle"),
-        ('{"schema": "sccal.summary/1", "runs": [{"vehicle": "a", "parameters": {"track_m": {}}}]}', "value"),
+        ('{"schema": "sccal.summary/1", "runs": [{"parameters": {}}]}', "run: is missing"),
+        ('{"schema": "sccal.summary/1", "runs": [{"run": "a", "parameters": {"track_m": {}}}]}', "parameters.radius"),
     ],
 )
 def test_what_is_no_baseline_is_refused(tmp_path, content, says):

@@ -86,9 +86,9 @@ def test_an_effect_must_have_been_asked_for():
 
 def test_every_name_of_a_document_may_stand_in_a_gate():
     """The names known beforehand must not refuse what calibration.json has."""
-    from sccal.report.as_json import calibration_json
+    from sccal.results.converter import document_of
 
-    document = calibration_json(run())
+    document = document_of(run())
     for name in set(single_values(document)) - set(OPEN):
         assert why_impossible(name) == "", name
     for block, keys in FIXED.items():

@@ -73,7 +73,7 @@ def test_numbers_and_times(result: tuple[Calibration, Path]) -> None:
     np.testing.assert_allclose([m.pose.covariance[35] ** 0.5 for _, m in poses], t.sigma_yaw_rad)
     np.testing.assert_allclose([m.pose.covariance[7] ** 0.5 for _, m in poses], t.sigma_north_m)
     positions = [(m.latitude, m.longitude) for _, m in found["/sccal/position"]]
-    back = TangentPlane(c.origin_lat_deg, c.origin_lon_deg, c.origin_alt_m).to_east_north(*np.array(positions).T)
+    back = TangentPlane(c.origin.lat_deg, c.origin.lon_deg, c.origin.alt_m).to_east_north(*np.array(positions).T)
     np.testing.assert_allclose(np.column_stack(back), np.column_stack((t.east_m, t.north_m)), atol=1e-6)
     for name, values, times in (
         ("radius_right_m", h.radius_right_m, h.t_s),

@@ -16,11 +16,10 @@ from sccal.gates.allowance import parse_allowance
 from sccal.gates.baseline import Baseline, Earlier, judge_drift
 from sccal.gates.expression import parse_gates
 from sccal.gates.judge import judge
-from sccal.report.as_json import json_text
-from sccal.report.batch_json import batch_json
 from sccal.report.gates_text import gates_text
 from sccal.report.junit import junit_xml
 from sccal.report.step_summary import MOST_BYTES, append_step_summary, cut, escaped, step_summary
+from sccal.results.converter import document_of, json_text
 from sccal.results.gates import BatchOutcome, GateResult
 from tests.results.documents import calibration, estimate, saved, vehicle
 
@@ -34,10 +33,10 @@ def batch(gates=("fit.nis_gnss<3", "outage.percent_of_distance<0.1", "vehicle:ve
         saved(calibration("straight", track_m=estimate(0.7, 0.2, "unobserved", "turn both ways"))),
         saved(calibration("wrong-gear", radius_left_m=estimate(0.1, 1e-5, "at_bound", "check ticks_per_rev"))),
     )
-    vehicles = (saved(vehicle()),)
+    vehicles = {"vehicle.json": saved(vehicle())}
     failures = (Failure("torn", DataError("torn/encoder.csv line 3: no number")), Failure("odd", SccalError("bug")))
     asked = (*gates, "parameters.track_m.sigma<0.01")
-    return BatchOutcome(runs, vehicles, failures, judge(parse_gates(asked), runs, vehicles))
+    return BatchOutcome(runs, vehicles, failures, judge(parse_gates(asked), runs, tuple(vehicles.values())))
 
 
 def read(text):
@@ -97,10 +96,10 @@ def test_counts_are_what_is_there():
 def test_whatever_names_hold_the_document_is_valid(name, of, reason, message):
     runs = (saved(calibration(name, of, track_m=estimate(0.7, 0.2, "unobserved", reason))), saved(calibration(name)))
     gates = tuple(GateResult(name, of, message, outcome, message, None, reason) for outcome in ("failed", "passed"))
-    outcome = BatchOutcome(runs, (saved(vehicle(of)),), (Failure(name, DataError(message)),), gates)
+    outcome = BatchOutcome(runs, {"vehicle.json": saved(vehicle(of))}, (Failure(name, DataError(message)),), gates)
     suites = read(junit_xml(outcome))
     assert len(suites) == 3
-    assert json.loads(json_text(batch_json(outcome)))["gates"][0]["outcome"] == "failed"
+    assert json.loads(json_text(document_of(outcome)))["gates"][0]["outcome"] == "failed"
     rows = [line for line in step_summary(outcome).splitlines() if line.startswith("|")]
     assert {len(re.findall(r"(?<!\\)\|", line)) for line in rows} <= {3, 8}
     assert len(gates_text(gates).splitlines()) >= 2
@@ -108,30 +107,30 @@ def test_whatever_names_hold_the_document_is_valid(name, of, reason, message):
 
 def test_a_batch_without_gates_fails_nothing():
     runs = (saved(calibration()),)
-    suites = read(junit_xml(BatchOutcome(runs, (saved(vehicle()),), ())))
+    suites = read(junit_xml(BatchOutcome(runs, {"vehicle.json": saved(vehicle())}, ())))
     assert list(suites) == ["yard"]
     assert set(outcomes(suites["yard"]).values()) == {"passed"}
     assert gates_text(()) == ""
-    assert read(junit_xml(BatchOutcome((), (), ()))) == {}
+    assert read(junit_xml(BatchOutcome((), {}, ()))) == {}
 
 
 def test_drift_tells_both_values_wherever_it_is_shown():
     runs = (saved(calibration(track_m=estimate(0.71, 1e-3))),)
-    before = saved(calibration()).parameters
+    before = saved(calibration()).parameters.by_key
     earlier = Earlier("yard", "demo", {f"parameters.{key}": one for key, one in before.items()})
     gates = judge_drift(Baseline(Path("previous.json"), (earlier,)), [parse_allowance("2sigma")], runs)
-    outcome = BatchOutcome(runs, (), (), gates)
-    for text in (junit_xml(outcome), gates_text(gates, 400), json_text(batch_json(outcome))):
+    outcome = BatchOutcome(runs, {}, (), gates)
+    for text in (junit_xml(outcome), gates_text(gates, 400), json_text(document_of(outcome))):
         assert "0.71 against 0.728 m of run yard in previous.json: -0.018 m, -12.7 sigma; allowed 0.00283 m" in text
 
 
 def test_the_json_holds_whole_documents_and_the_exit_code():
     outcome = batch()
-    document = json.loads(json_text(batch_json(outcome)))
+    document = json.loads(json_text(document_of(outcome)))
     assert document["schema"] == "sccal.batch/1"
     assert document["exit_code"] == 4
     assert [one["run"] for one in document["runs"]] == ["good", "straight", "wrong-gear"]
-    assert document["runs"][0] == outcome.runs[0].document
+    assert document["runs"][0] == document_of(outcome.runs[0])
     assert document["failures"][0] == {
         "run": "torn",
         "error": "DataError",
@@ -165,7 +164,7 @@ def test_the_page_is_cut_at_what_github_takes(tmp_path, there):
     page = tmp_path / "page.md"
     page.write_bytes(b"x" * there)
     runs = tuple(saved(calibration(f"ü{k}" * 40)) for k in range(8000))
-    append_step_summary(BatchOutcome(runs, (), ()), {"GITHUB_STEP_SUMMARY": str(page)})
+    append_step_summary(BatchOutcome(runs, {}, ()), {"GITHUB_STEP_SUMMARY": str(page)})
     content = page.read_bytes()
     assert len(content) <= MOST_BYTES
     assert ("Cut here" in content[there:].decode()) is (there < MOST_BYTES - 20)

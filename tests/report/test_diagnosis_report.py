@@ -16,13 +16,12 @@ import pytest
 
 from sccal.effects.catalogue import CATALOGUE
 from sccal.logs.streams import Notice, Vehicle
-from sccal.report.as_json import json_text
 from sccal.report.diagnosis_figures import candidates, drift_before_after, finding_drawings, residual_picture
 from sccal.report.diagnosis_html import diagnosis_html
-from sccal.report.diagnosis_json import diagnosis_json
 from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
 from sccal.report.diagnosis_write import write_diagnosis
 from sccal.results.calibration import Estimate, Noise, OutageWindow, Parameters
+from sccal.results.converter import document_of, json_text
 from sccal.results.diagnosis import (
     Detectable,
     Diagnosis,
@@ -408,7 +407,7 @@ def test_the_terminal_report_needs_neither_matplotlib_nor_jinja2() -> None:
 
 
 def test_the_json_s_keys_and_units() -> None:
-    document = diagnosis_json(replace(TWO, unexplained=LEFT_OVER.unexplained))
+    document = document_of(replace(TWO, unexplained=LEFT_OVER.unexplained))
     assert document["schema"] == "sccal.diagnosis/1"
     assert list(document["runs"]) == list(TWO.runs)
     first, second = document["findings"]
@@ -436,7 +435,7 @@ def test_the_json_s_keys_and_units() -> None:
 
 
 def test_nothing_unexplained_keeps_its_keys() -> None:
-    left = diagnosis_json(ONE)["unexplained"]
+    left = document_of(ONE)["unexplained"]
     assert left["significant"] is False
     assert left["port"] is None
     assert left["depends_on"] is None
@@ -445,7 +444,7 @@ def test_nothing_unexplained_keeps_its_keys() -> None:
 
 @each
 def test_the_json_is_strict(d: Diagnosis) -> None:
-    text = json_text(diagnosis_json(d))
+    text = json_text(document_of(d))
     json.loads(text, parse_constant=lambda constant: pytest.fail(f"{constant} is not JSON"))
 
 
@@ -458,7 +457,7 @@ def test_what_is_not_finite_is_null() -> None:
     )
     before = replace(judgement(None), gnss_innovation_rms_m=NAN, heading_innovation_rms_rad=NAN)
     d = replace(diagnosis(holed), before=before, placebo=Placebo(0, 0, -math.inf, NAN))
-    document = json.loads(json_text(diagnosis_json(d)))
+    document = json.loads(json_text(document_of(d)))
     assert document["findings"][0]["evidence"]["t"] is None
     assert document["findings"][0]["parameters"]["left_m"]["sigma"] is None
     assert document["findings"][0]["picture"]["after"] == [None] * 24

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 from sccal.experiments.plan import EXPERIMENTS, PATHS, judged_s
-from sccal.report.as_json import json_text
 from sccal.report.experiments_figures import cell_drawings, convergence, overview_drawing
 from sccal.report.experiments_html import experiments_html
-from sccal.report.experiments_json import experiments_json
 from sccal.report.experiments_text import answers, experiments_text, headline, ratio_text, spread_text
 from sccal.report.experiments_write import write_experiments
 from sccal.results.calibration import Estimate, History, Parameters, Trajectory
+from sccal.results.converter import document_of, json_text
 from sccal.results.experiments import (
     PARAMETERS,
     VARIANTS,
@@ -146,7 +145,7 @@ def assert_numbers(html: str) -> None:
 
 
 def test_the_json_has_every_seed_and_is_strict() -> None:
-    document = json.loads(json_text(experiments_json(ALL)), parse_constant=pytest.fail)
+    document = json.loads(json_text(document_of(ALL)), parse_constant=pytest.fail)
     assert document["schema"] == "sccal.experiments/1"
     assert (document["duration_s"], document["seeds"], document["tolerance_percent"]) == (120.0, [1, 2, 3], 1.0)
     assert len(document["cells"]) == 9
@@ -172,7 +171,7 @@ def test_the_json_has_every_seed_and_is_strict() -> None:
 
 def test_one_seed_has_no_interval_and_unknown_truth_no_errors() -> None:
     alone = replace(cell(seeds=1), truth=None, errors_percent=np.zeros((0, 3)), within_percent=0)
-    (one,) = experiments_json(Experiments((alone,), 120.0, (1,)))["cells"]
+    (one,) = document_of(Experiments((alone,), 120.0, (1,)))["cells"]
     assert one["ratio"]["interval_95"] == [None, None]
     assert one["truth"] is None
     assert one["within_percent"] is None
@@ -234,7 +233,7 @@ def test_failed_runs_are_told() -> None:
     told = Experiments(ALL.cells[:1], 120.0, (1, 2, 3), failed)
     assert "yard/<b>: run.nmea has no fix; record one" in experiments_text(told)
     assert "yard/&lt;b&gt;" in experiments_html(told)
-    assert experiments_json(told)["failed"] == [{"name": "yard/<b>", "reason": "run.nmea has no fix; record one"}]
+    assert document_of(told)["failed"] == [{"name": "yard/<b>", "reason": "run.nmea has no fix; record one"}]
 
 
 def test_numbers_of_any_size_stay_short() -> None:

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
+from sccal.calibration.judged_model import digest_of, read_judged_model
 from sccal.effects.catalogue import CATALOGUE
 from sccal.errors import DataError, UsageError
-from sccal.report.as_json import json_text
-from sccal.report.model_json import digest_of, model_from, model_json, read_model
 from sccal.results.calibration import Estimate, Noise, Parameters
+from sccal.results.converter import document_of, json_text, result_from
 from sccal.results.model import JudgedEffect, JudgedModel, Range
 from tests.report.conftest import estimates
 
@@ -74,15 +74,15 @@ def stored(folder: Path, document: Any) -> Path:
 
 def test_a_model_comes_back_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "model.json"
-    path.write_text(json_text(model_json(MODEL)), encoding="utf-8")
-    assert close(read_model(path), MODEL)
-    assert digest_of(read_model(path)) == digest_of(MODEL)
+    path.write_text(json_text(document_of(MODEL)), encoding="utf-8")
+    assert close(read_judged_model(path), MODEL)
+    assert digest_of(read_judged_model(path)) == digest_of(MODEL)
     unjudged = replace(MODEL, outage_end_rms_m=None, effects=())
-    assert close(model_from(json.loads(json_text(model_json(unjudged))), path), unjudged)
+    assert close(result_from(json.loads(json_text(document_of(unjudged))), JudgedModel), unjudged)
 
 
 def test_angles_are_degrees_and_the_document_is_strict() -> None:
-    text = json_text(model_json(MODEL))
+    text = json_text(document_of(MODEL))
     document = json.loads(text, parse_constant=lambda constant: pytest.fail(f"{constant} is not JSON"))
     assert document["schema"] == "sccal.model/1"
     assert document["parameters"]["heading_offset_deg"]["value"] == pytest.approx(-3.2145)
@@ -133,27 +133,27 @@ def put(document: dict[str, Any], place: str, value: Any) -> dict[str, Any]:
         ("effects/2/shapes", {}, "effects[2].shapes.at_s: is missing, and heading_step is nothing without it"),
         ("effects/3/prior_scale", 0.0, "effects[3].prior_scale: must be above zero"),
         ("effects/3/told", 1, "effects[3].told: must be true or false"),
-        ("effects/3/run", 1, "effects[3].run: must be the name of a run, or null"),
-        ("noise/1/fix_tau_s", None, "noise[1].fix_tau_s: must be a number, not null"),
-        ("noise/1/fix_tau_s", -1, "noise[1].fix_tau_s: must be above zero"),
-        ("noise/0/other_fix_scale/good", 1.0, "noise[0].other_fix_scale.good: is no quality"),
-        ("noise/0", [], "noise[0] must be a block of names"),
+        ("effects/3/run", 1, "effects[3].run: must be text, not 1"),
+        ("noise/1/fix_tau_s", None, "noise[1].fix_tau_s: must be a number above zero"),
+        ("noise/1/fix_tau_s", -1, "noise[1].fix_tau_s: must be a number above zero"),
+        ("noise/0/other_fix_scale/good", 1.0, "noise[0].other_fix_scale.good: is no whole number"),
+        ("noise/0", [], "noise[0]: must be a block of names"),
         ("held_out/how", ..., "held_out.how: is missing"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_place(tmp_path: Path, place: str, value: Any, says: str) -> None:
-    path = stored(tmp_path, put(model_json(MODEL), place, value))
+    path = stored(tmp_path, put(document_of(MODEL), place, value))
     with pytest.raises(DataError) as caught:
-        read_model(path)
+        read_judged_model(path)
     assert str(caught.value).startswith(str(path))
     assert says in str(caught.value)
 
 
 def test_files_that_are_no_documents(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such file"):
-        read_model(tmp_path / "model.json")
+        read_judged_model(tmp_path / "model.json")
     for content in ("", "{", '{"schema": NaN}', "[]", '"text"', '{"schema": "sccal.model/1"}'):
         path = tmp_path / "model.json"
         path.write_text(content)
         with pytest.raises(DataError, match=r"model\.json"):
-            read_model(path)
+            read_judged_model(path)

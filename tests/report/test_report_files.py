@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import yaml
 
-from sccal.report.as_json import calibration_json, json_text, vehicle_json
 from sccal.report.ros2_control import ros2_control_yaml
 from sccal.report.trajectory import trajectory_csv, trajectory_tum
 from sccal.report.write import write_calibration, write_numbers, write_vehicle
 from sccal.results.calibration import Calibration, Estimate, VehicleCalibration
+from sccal.results.converter import document_of, json_text
 
 FIVE = {"calibration.json", "trajectory.csv", "trajectory.tum", "ros2_control.yaml", "report.html"}
 
@@ -30,7 +30,7 @@ def strictly(text: str) -> Any:
 
 
 def test_calibration_json_keeps_the_contract(a_run: Calibration) -> None:
-    document = strictly(json_text(calibration_json(a_run)))
+    document = strictly(json_text(document_of(a_run)))
     assert document["schema"] == "sccal.calibration/1"
     assert (document["run"], document["vehicle"], document["variant"]) == (a_run.run, "tracked-demo", "sc_ekf_offset")
     assert list(document["parameters"]) == ["radius_right_m", "radius_left_m", "track_m", "heading_offset_deg"]
@@ -51,7 +51,7 @@ def test_calibration_json_keeps_the_contract(a_run: Calibration) -> None:
 
 def test_what_is_not_a_number_is_null(an_ugly_run: Calibration) -> None:
     effects = {"lever_arm": {"forward_m": Estimate(np.float64(0.2), math.inf, "unobserved", "drive \udc80 faster")}}
-    document = strictly(json_text(calibration_json(replace(an_ugly_run, effects=effects))))
+    document = strictly(json_text(document_of(replace(an_ugly_run, effects=effects))))
     assert document["parameters"]["radius_left_m"]["sigma"] is None
     assert document["fit"]["gnss_innovation_rms_m"] is None
     assert document["outage"]["rms_m"] is None
@@ -61,12 +61,12 @@ def test_what_is_not_a_number_is_null(an_ugly_run: Calibration) -> None:
 
 def test_heading_offset_is_wrapped(a_run: Calibration) -> None:
     turned = replace(a_run.parameters.heading_offset_rad, value=math.radians(190.0))
-    document = calibration_json(replace(a_run, parameters=replace(a_run.parameters, heading_offset_rad=turned)))
+    document = document_of(replace(a_run, parameters=replace(a_run.parameters, heading_offset_rad=turned)))
     assert document["parameters"]["heading_offset_deg"]["value"] == pytest.approx(-170.0)
 
 
 def test_vehicle_json_holds_its_runs(a_vehicle: VehicleCalibration) -> None:
-    document = strictly(json_text(vehicle_json(a_vehicle)))
+    document = strictly(json_text(document_of(a_vehicle)))
     assert document["schema"] == "sccal.calibration/1"
     assert document["run"] == "(vehicle)"
     assert document["consistency_chi2_per_dof"] == 1.21

@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,17 +15,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sccal.errors import DataError, Failure, SccalError
+from sccal.logs.streams import Notice
 from sccal.report.index_csv import FORMULA_MARKS, summary_csv
 from sccal.report.index_figures import PATH_UNITS, control_chart, path_strokes
 from sccal.report.index_html import index_html
-from sccal.report.index_json import summary_json
-from sccal.report.index_lines import change_sentence, changes, headline
+from sccal.report.index_lines import change_sentence, changes, headline, with_sentences
 from sccal.report.index_write import write_summary
-from sccal.results.saved import VEHICLE_RUN, Saved, read_saved
+from sccal.results.calibration import VEHICLE_RUN
+from sccal.results.converter import document_of
 from sccal.results.summary import ThinPath
-from sccal.summary import summarise
+from sccal.results.verdict import Verdict
+from sccal.summary.summarise import summarise as summarised
 from tests.report.pages import assert_page
-from tests.summary.fleets import estimate, history, of_vehicle, written
+from tests.results.documents import retold
+from tests.summary.fleets import estimate, history, of_vehicle, with_parameter, written
 
 FAILURES = [Failure("broken", DataError("broken/encoder.csv: is empty")), Failure("=cmd()", SccalError("a bug"))]
 
@@ -40,6 +44,10 @@ class Gate:
     threshold: float | None = 0.01
 
 
+def summarise(runs, vehicles=None, failures=(), out=Path("out")):
+    return with_sentences(summarised(runs, vehicles or {}, failures, out))
+
+
 def worn(count=12, **more):
     return history(count, change={"radius_left_m": np.linspace(0.0, -4e-4, count)}, **more)
 
@@ -47,15 +55,12 @@ def worn(count=12, **more):
 @pytest.fixture(scope="module")
 def summary(tmp_path_factory):
     folder = tmp_path_factory.mktemp("batch")
-    runs = worn(folder=folder)
-    runs[2].document["parameters"]["track_m"] = estimate(0.7, 0.2, "unobserved")
-    runs[2].document["verdict"] = "partial: track_m not observed"
-    runs[3].document["notices"] = [
-        {"severity": "warning", "text": "clock: off by 97 s"},
-        {"severity": "info", "text": "-"},
-    ]
-    written(runs)
-    return summarise([read_saved(one.path) for one in runs], [of_vehicle(runs)], FAILURES)
+    runs = worn()
+    runs[2] = with_parameter(runs[2], "track_m", estimate(0.7, 0.2, "unobserved"))
+    runs[2] = replace(runs[2], verdict=Verdict("partial", ("track_m not observed",)))
+    runs[3] = replace(runs[3], notices=(Notice("clock", "off by 97 s", 1, "", "warning"), Notice("-", "-", 1)))
+    written(runs, folder)
+    return summarise(runs, of_vehicle(runs), FAILURES, folder)
 
 
 class Page(HTMLParser):
@@ -150,24 +155,29 @@ def test_a_thousand_runs_make_a_page_below_three_megabytes(tmp_path):
 def test_names_are_escaped_and_links_quoted():
     evil = "<script>alert(1)</script>"
     runs = history(5, vehicle=evil)
-    named = [Saved(one.path, {**one.document, "run": f"a b#{k}/{evil}"}) for k, one in enumerate(runs)]
-    html = index_html(summarise(named, [], [Failure(evil, DataError(evil))]), [Gate(evil, "failed", evil, evil, evil)])
+    named = [replace(one, run=f"a b#{k}/{evil}") for k, one in enumerate(runs)]
+    html = index_html(
+        replace(summarise(named, {}, [Failure(evil, DataError(evil))]), gates=(Gate(evil, "failed", evil, evil, evil),))
+    )
     assert_index(html)
     assert "alert(1)</script>" not in html
     assert 'href="./a%20b%230/%3Cscript%3Ealert%281%29%3C/script%3E/report.html"' in html
 
 
 def test_gates_are_told_with_what_failed_them(summary):
-    gates = [Gate("run000", "failed", "0.02 is not < 0.01"), Gate("run001", "passed"), Gate(VEHICLE_RUN, "skipped")]
-    html = index_html(summary, gates)
+    told = replace(
+        summary,
+        gates=(Gate("run000", "failed", "0.02 is not < 0.01"), Gate("run001", "passed"), Gate(VEHICLE_RUN, "skipped")),
+    )
+    html = index_html(told)
     assert_index(html)
     assert "1 passed, 1 failed, 1 skipped" in html
     assert "run000: 0.02 is not &lt; 0.01" in html
-    assert [gate["outcome"] for gate in summary_json(summary, gates)["gates"]] == ["failed", "passed", "skipped"]
+    assert [gate["outcome"] for gate in document_of(told)["gates"]] == ["failed", "passed", "skipped"]
 
 
 def test_the_document_holds_what_the_files_held(summary):
-    document = json.loads(json.dumps(summary_json(summary), allow_nan=False))
+    document = json.loads(json.dumps(document_of(summary), allow_nan=False))
     assert document["schema"] == "sccal.summary/1"
     assert document["totals"] == {
         "runs": 14, "good": 11, "partial": 1, "doubtful": 0, "failed": 2, "duration_s": 3600.0, "distance_m": 1920.0,
@@ -180,7 +190,7 @@ def test_the_document_holds_what_the_files_held(summary):
     assert first["outage"] == {
         "window_s": 30.0, "windows": 8, "rms_m": 0.06, "end_rms_m": 0.08, "percent_of_distance": 0.4,
     }  # fmt: skip
-    assert document["runs"][3]["warnings"] == ["clock: off by 97 s"]
+    assert document["runs"][3]["warnings"] == ["clock: 1 off by 97 s"]
     assert document["failures"][1] == {"run": "broken", "reason": "broken/encoder.csv: is empty", "exit_code": 3}
     told = {one["parameter"]: one["change"] for one in document["vehicles"][0]["trends"]}
     assert told["radius_left_m"]["sentence"] in changes(summary)
@@ -190,10 +200,10 @@ def test_the_document_holds_what_the_files_held(summary):
 
 def test_numbers_that_are_not_there_are_null_and_empty():
     runs = history(2)
-    runs[0].document["parameters"]["track_m"] = {**estimate(0.0, 0.0, "unobserved"), "value": None, "sigma": None}
-    runs[1].document["outage"] = {"window_s": 30.0, "windows": 0, "rms_m": None}
-    made = summarise(runs, [], [])
-    document = json.loads(json.dumps(summary_json(made), allow_nan=False))
+    nothing = {**estimate(0.0, 0.0, "unobserved"), "value": None, "sigma": None}
+    runs = [with_parameter(runs[0], "track_m", nothing), retold(runs[1], outage={"window_s": 30.0, "rms_m": None})]
+    made = summarise(runs)
+    document = json.loads(json.dumps(document_of(made), allow_nan=False))
     assert document["runs"][0]["parameters"]["track_m"]["value"] is None
     assert document["runs"][1]["outage"]["rms_m"] is None
     table = pd.read_csv(io.StringIO(summary_csv(made)))
@@ -220,8 +230,8 @@ def test_the_table_is_a_table_of_numbers(summary):
 @given(st.text(max_size=12), st.text(max_size=12), st.text(max_size=12))
 def test_no_text_from_outside_becomes_a_formula(run, vehicle, reason):
     runs = history(1, vehicle=vehicle)
-    named = [Saved(runs[0].path, {**runs[0].document, "run": run, "verdict": f"doubtful: {reason}"})]
-    text = summary_csv(summarise(named, [], [Failure(run, DataError(reason))]))
+    named = [replace(runs[0], run=run, verdict=Verdict("doubtful", (reason,)))]
+    text = summary_csv(summarise(named, {}, [Failure(run, DataError(reason))]))
     rows = list(csv.reader(io.StringIO(text, newline="")))
     assert len(rows) == 3
     assert len({len(row) for row in rows}) == 1

@@ -118,7 +118,7 @@ def test_provenance_stands_on_the_page_where_it_is_known(a_run: Calibration) -> 
     made = Provenance(
         (InputFile("encoder.csv", 123456, digest),), {"outage_window_s": "30"}, {"sccal": "0.1.0", "numpy": "2.0"}
     )
-    html = run_html(replace(a_run, provenance=made, started_utc_s=1780000000.0))
+    html = run_html(replace(a_run, provenance=made, started="2026-05-28T20:26:40Z"))
     assert_page(html)
     for told in (digest, "123456", "outage_window_s = 30", "numpy 2.0", "2026-05-28 20:26 UTC"):
         assert told in html

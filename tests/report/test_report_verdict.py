@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from sccal.calibration.verdict import judged_run, judged_vehicle, run_verdict, vehicle_verdict
-from sccal.report.as_json import calibration_json, vehicle_json
 from sccal.report.html import run_html
 from sccal.report.junit import junit_xml
 from sccal.report.step_summary import step_summary
 from sccal.report.text import run_text, vehicle_text
 from sccal.results.calibration import Calibration, Missing, Status, VehicleCalibration
+from sccal.results.converter import document_of
 from sccal.results.gates import BatchOutcome
-from sccal.results.saved import Saved
 
 
 def with_status(c: Calibration, status: Status, *names: str) -> Calibration:
@@ -54,7 +52,7 @@ def test_what_one_run_shows_missing_is_the_vehicle_s_doubt(a_run: Calibration, a
     runs = (replace(a_run, missing=(weaker,)), replace(a_run, missing=(SLIP, ARM)), a_run)
     vehicle = judged_vehicle(replace(a_vehicle, runs=runs, consistency_chi2_per_dof=1.0))
     assert vehicle.verdict.because == (f"`sccal diagnose` would name {ARM.title} and {SLIP.title}",)
-    assert vehicle_json(vehicle)["missing"][0] == {
+    assert document_of(vehicle)["missing"][0] == {
         "effect": "lever_arm", "title": ARM.title, "evidence_nats": 812.4, "size": 8.0
     }  # fmt: skip
     text = " ".join(vehicle_text(vehicle, 100).split())
@@ -63,16 +61,15 @@ def test_what_one_run_shows_missing_is_the_vehicle_s_doubt(a_run: Calibration, a
 
 def test_what_the_model_lacks_is_told_wherever_the_run_is(a_run: Calibration) -> None:
     lacking = judged_run(replace(a_run, missing=(ARM,)))
-    assert calibration_json(lacking)["missing"] == [
+    assert document_of(lacking)["missing"] == [
         {"effect": "lever_arm", "title": ARM.title, "evidence_nats": 812.4, "size": 8.0}
     ]
-    assert calibration_json(lacking)["verdict"].startswith("doubtful: `sccal diagnose` would name antenna off")
+    assert document_of(lacking)["verdict"].startswith("doubtful: `sccal diagnose` would name antenna off")
     html = run_html(lacking)
     assert ARM.title in html
     assert "sccal calibrate … --model OUT/model.json" in html
     assert "lacks    by a quick look, lever_arm" in run_text(lacking, 100)
-    saved = Saved(Path("calibration.json"), calibration_json(lacking))
-    outcome = BatchOutcome((saved,), (), (), ())
+    outcome = BatchOutcome((lacking,), {}, (), ())
     assert f"lever\\_arm: {ARM.title}" in step_summary(outcome)
     assert f"would name {ARM.title}" in junit_xml(outcome)
 

@@ -7,9 +7,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from sccal.results.saved import VEHICLE_RUN, Saved, read_saved
+import jsonschema
+
+from sccal.results.calibration import VEHICLE_RUN, Calibrated, Calibration, VehicleCalibration
+from sccal.results.converter import document_of, result_from
+from sccal.results.files import read_calibration
 
 Json = dict[str, Any]
+SCHEMAS = Path(__file__).resolve().parents[2] / "docs" / "schemas"
 
 _ESTIMATES = {
     "radius_right_m": (0.0808, 2e-5, 0.08),
@@ -40,6 +45,7 @@ def calibration(run: str = "yard", vehicle: str = "demo", **parameters: Json) ->
         }
         | copy.deepcopy(parameters),
         "effects": {},
+        "origin": {"lat_deg": 37.5, "lon_deg": 15.1, "alt_m": 20.0},
         "fit": {"nis_gnss": 1.01, "nis_heading": 0.98, "fixes_rejected": 0, "gnss_innovation_rms_m": 0.015},
         "outage": {"window_s": 30.0, "windows": 8, "rms_m": 0.05, "end_rms_m": 0.08, "percent_of_distance": 0.4},
         "reference": None,
@@ -56,14 +62,30 @@ def vehicle(name: str = "demo", **parameters: Json) -> Json:
     return document
 
 
-def saved(document: Json) -> Saved:
+def saved(document: Json) -> Calibrated:
     """As if read from its file."""
-    name = "vehicle.json" if document["run"] == VEHICLE_RUN else "calibration.json"
-    return Saved(Path("out") / name, document)
+    return result_from(document, VehicleCalibration if document["run"] == VEHICLE_RUN else Calibration)
 
 
-def stored(folder: Path, document: Json, name: str = "calibration.json") -> Saved:
+def retold(result: Calibrated, **blocks: Any) -> Calibrated:
+    """The result as its document would tell it with some blocks exchanged."""
+    return saved(document_of(result) | blocks)
+
+
+def stored(folder: Path, document: Json, name: str = "calibration.json") -> Calibrated:
     """Written and read again."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / name).write_text(json.dumps(document), encoding="utf-8")
-    return read_saved(folder / name)
+    return read_calibration(folder / name)
+
+
+def schema_file(document: Json) -> Path:
+    """Where docs has the schema of such a document."""
+    name = document["schema"].partition(".")[2].partition("/")[0]
+    return SCHEMAS / f"{'vehicle' if document.get('run') == VEHICLE_RUN else name}.json"
+
+
+def held_to_its_schema(document: Json | str) -> None:
+    """Raises jsonschema.ValidationError where a document is not what docs/schemas says."""
+    document = json.loads(document) if isinstance(document, str) else document
+    jsonschema.validate(document, json.loads(schema_file(document).read_text("utf-8")))

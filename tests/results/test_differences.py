@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sccal.results.calibration import Estimate
 from sccal.results.differences import Difference, difference, unit_of, why_not_estimated, why_own_log_only
-from sccal.results.saved import SavedEstimate
 
 angles = st.floats(-180.0, 180.0, exclude_min=True)
 
 
 def of(value, sigma=1.0, status="estimated", reason=""):
-    return SavedEstimate(value, sigma, status, reason)
+    return Estimate(value, sigma, status, reason)
 
 
 def test_the_sign_is_after_minus_before():

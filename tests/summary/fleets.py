@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.report.as_json import json_text
 from sccal.report.trajectory import CSV_HEADER
-from sccal.results.saved import SCHEMA, VEHICLE_RUN, Saved
+from sccal.results.calibration import CALIBRATION_SCHEMA, VEHICLE_RUN, Calibration, VehicleCalibration
+from sccal.results.converter import document_of, json_text
+from tests.results.documents import retold, saved
 
 FIRST_DAY = datetime(2026, 5, 3, 9, 30, tzinfo=UTC)
 TRUE = {"radius_right_m": 0.0808, "radius_left_m": 0.0796, "track_m": 0.728, "heading_offset_deg": 12.5}
@@ -32,7 +34,7 @@ def document(
 ) -> dict[str, Any]:
     """What stands in a run's calibration.json, as far as a summary reads it."""
     return {
-        "schema": SCHEMA,
+        "schema": CALIBRATION_SCHEMA,
         "sccal_version": "0.1.0",
         "run": run,
         "vehicle": vehicle,
@@ -41,7 +43,7 @@ def document(
         "parameters": parameters,
         "effects": {},
         "fit": {"gnss_innovation_rms_m": 0.0152, "nis_gnss": 1.01, "fixes_used": 588, "recoveries": 0},
-        "outage": {"window_s": 30.0, "windows": 8, "rms_m": 0.06, "end_rms_m": 0.08, "percent_of_distance": 0.4},
+        "outage": {"each": [{}] * 8, "window_s": 30.0, "rms_m": 0.06, "end_rms_m": 0.08, "percent_of_distance": 0.4},
         "drive": {"duration_s": 300.0, "distance_m": 160.0},
         "notices": [],
         "provenance": {
@@ -61,9 +63,8 @@ def history(
     vehicle: str = "tracked-demo",
     prefix: str = "run",
     with_dates: bool = True,
-    folder: Path = Path("out"),
     **more: Any,
-) -> list[Saved]:
+) -> list[Calibration]:
     """Runs evenly over so many days; ``change`` (count,) is added to the truth of a parameter."""
     rng = np.random.default_rng(seed)
     change = change or {}
@@ -77,28 +78,33 @@ def history(
         }
         started = FIRST_DAY + timedelta(days=days * k / max(count - 1, 1)) if with_dates else None
         run = f"{prefix}{k:03d}"
-        made.append(Saved(folder / run / "calibration.json", document(run, started, parameters, vehicle, **more)))
+        made.append(saved(document(run, started, parameters, vehicle, **more)))
     return made
 
 
-def of_vehicle(runs: Sequence[Saved], folder: Path = Path("out"), stem: str = "vehicle") -> Saved:
-    """The file of the runs' vehicle, with their plain means."""
-    first = runs[0]
-    parameters = {
-        key: estimate(float(np.mean([one.parameters[key].value for one in runs])), SIGMA[key] / len(runs) ** 0.5)
+def of_vehicle(runs: Sequence[Calibration], file: str = "vehicle.json") -> dict[str, VehicleCalibration]:
+    """The runs' vehicle by the name of its file, with their plain means."""
+    means = {
+        key: estimate(float(np.mean([one.parameters.by_key[key].value for one in runs])), SIGMA[key] / len(runs) ** 0.5)
         for key in TRUE
     }
-    made = document(VEHICLE_RUN, None, parameters, first.vehicle)
-    return Saved(folder / f"{stem}.json", {**made, "runs": [{"run": one.run} for one in runs]})
+    made = document(VEHICLE_RUN, None, means, runs[0].vehicle.name)
+    return {file: replace(saved(made), runs=tuple(runs))}
 
 
-def written(runs: Sequence[Saved], rows: int = 300, seed: int = 1) -> None:
-    """Each run's calibration.json and a trajectory of so many rows, into its folder."""
+def with_parameter(run: Calibration, key: str, block: dict[str, Any]) -> Calibration:
+    """The run with one parameter told otherwise."""
+    return retold(run, parameters=document_of(run)["parameters"] | {key: block})
+
+
+def written(runs: Sequence[Calibration], out: Path, rows: int = 300, seed: int = 1) -> None:
+    """Each run's calibration.json and a trajectory of so many rows, into its folder below ``out``."""
     rng = np.random.default_rng(seed)
-    for saved in runs:
-        saved.path.parent.mkdir(parents=True, exist_ok=True)
-        saved.path.write_text(json_text(saved.document), encoding="utf-8")
+    for run in runs:
+        folder = out / run.run
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "calibration.json").write_text(json_text(document_of(run)), encoding="utf-8")
         yaw = np.cumsum(rng.normal(0.0, 0.02, rows) + 0.02 * np.sin(np.arange(rows) / 200.0))
         table = np.column_stack([0.1 * np.arange(rows), np.cumsum(np.cos(yaw)) / 10, np.cumsum(np.sin(yaw)) / 10, yaw])
         lines = [f"{t:.6f},{e:.4f},{n:.4f},{y:.6f},0.01000,0.01000,0.0020000\n" for t, e, n, y in table.tolist()]
-        (saved.path.parent / "trajectory.csv").write_text(CSV_HEADER + "".join(lines), encoding="utf-8")
+        (folder / "trajectory.csv").write_text(CSV_HEADER + "".join(lines), encoding="utf-8")
