@@ -60,8 +60,8 @@ def _run(run: RunLine, keys: list[str]) -> list[Cell]:
         one = estimates.get(key)
         cells += [None, None, None] if one is None else [one.value, one.sigma, one.status]
     cells += document_of(run.fit).values()
-    o = run.outage_in_short
-    cells += [o.window_s, o.windows, o.rms_m, o.end_rms_m, o.percent_of_distance]
+    o = run.outage
+    cells += [o.window_s, o.count, o.rms_m, o.end_rms_m, o.percent_of_distance]
     return [*cells, len(run.warnings), 0, "; ".join(run.verdict.because)]
 
 

@@ -401,15 +401,6 @@ class Calibration:
 
 
 @dataclass(frozen=True)
-class RunInShort:
-    """A run in the file of its vehicle."""
-
-    run: str
-    verdict: Verdict
-    parameters: Parameters
-
-
-@dataclass(frozen=True)
 class VehicleCalibration:
     """Several runs of one vehicle as one problem: shared radii and track, own poses and offsets."""
 
@@ -434,7 +425,7 @@ class VehicleCalibration:
     SCHEMA: ClassVar[str] = CALIBRATION_SCHEMA
     WRITTEN: ClassVar[str] = (
         "run vehicle variant verdict parameters! effects consistency_chi2_per_dof fit outage held_out missing "
-        "runs=in_short notices"
+        "runs=runs(run verdict parameters) notices"
     )
 
     @property
@@ -462,16 +453,10 @@ class VehicleCalibration:
         """The runs have their own."""
         return
 
-    @property
-    def in_short(self) -> tuple[RunInShort, ...]:
-        """The runs, as far as the vehicle's file tells of them."""
-        return tuple(RunInShort(one.run, one.verdict, one.parameters) for one in self.runs)
-
     @staticmethod
-    def further(document: Mapping[str, Any], part: Any) -> dict[str, Any]:
-        """What a document tells in other words: of its runs only what is told in short."""
-        runs = part("runs", tuple[Calibration, ...]) if "runs" in document else ()
-        return {"with_offset": document.get("variant") != FILTERS[False], "runs": runs}
+    def further(document: Mapping[str, Any], _: Any) -> dict[str, Any]:
+        """What a document tells in other words."""
+        return {"with_offset": document.get("variant") != FILTERS[False]}
 
 
 Calibrated = Calibration | VehicleCalibration

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from sccal.results.calibration import Estimate, Status
+from sccal.results.calibration import Estimate
 from sccal.results.differences import Difference
 
 Change = Literal["changed", "unchanged", "not comparable"]
@@ -24,16 +24,6 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Stated:
-    """One of two estimates that are compared."""
-
-    value: float
-    sigma: float
-    status: Status
-    reason: str
-
-
-@dataclass(frozen=True)
 class Pair:
     """One parameter in both results."""
 
@@ -48,32 +38,10 @@ class Pair:
     reason: str
     """Why they cannot be compared; empty where they can."""
 
-    WRITTEN: ClassVar[str] = "name change reason a=stated_a b=stated_b difference=amount sigma in_sigmas"
-
-    @property
-    def stated_a(self) -> Stated | None:
-        """A's, as far as a comparison repeats it."""
-        return _stated(self.a)
-
-    @property
-    def stated_b(self) -> Stated | None:
-        """B's, as far as a comparison repeats it."""
-        return _stated(self.b)
-
-    @property
-    def amount(self) -> float | None:
-        """B − A, in the unit of the name."""
-        return None if self.difference is None else self.difference.amount
-
-    @property
-    def sigma(self) -> float | None:
-        """Of the difference."""
-        return None if self.difference is None else self.difference.sigma
-
-    @property
-    def in_sigmas(self) -> float | None:
-        """The difference over its sigma."""
-        return None if self.difference is None else self.difference.in_sigmas
+    WRITTEN: ClassVar[str] = (
+        "name change reason a=a(value sigma status reason) b=b(value sigma status reason) "
+        "difference=difference.amount sigma=difference.sigma in_sigmas=difference.in_sigmas"
+    )
 
 
 @dataclass(frozen=True)
@@ -136,7 +104,3 @@ class Comparison:
     def comparable(self) -> bool:
         """Whether anything could be compared."""
         return self.kind == "diagnosis" or any(one.change != "not comparable" for one in self.pairs)
-
-
-def _stated(one: Estimate | None) -> Stated | None:
-    return None if one is None else Stated(one.value, one.sigma, one.status, one.reason)

@@ -1,8 +1,13 @@
 """Results to JSON documents and back, by one rule for every type.
 
-A document holds the fields of its type in their order, or what the type's WRITTEN says: words of the form ``name``,
-``key=name`` where the file has another name for it, ``name!`` where no document may lack it, and ``*name`` where the
-parts of a block stand among its neighbours. A name may be that of a property, which is written and never read.
+A document holds the fields of its type in their order, or what the type's WRITTEN says, in words of these forms:
+
+    name            a field, or a property, which is written and never read
+    key=name        where the file has another name for it; key=block.name for a part of one
+    name!           where no document may lack it
+    key=name(a b)   of a block, of each in a list, or of each by name, only these
+    key=(a b)       a block of its own in the file, made of these
+    *name           the parts of a block among their neighbours
 
 Angles are radians here and degrees there, by the names of the two: ``turned_left_rad`` is ``turned_left_deg`` in a
 file, ``gyro_radps`` is ``gyro_dps``. A number that is not finite, or not known, is null. What a document does not tell
@@ -13,10 +18,11 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -40,6 +46,7 @@ WRITTEN_OF_LOGS: Mapping[type, str] = {
 }
 """Layouts of what the readers of logs leave in results."""
 _ANGLES = (("_radps", "_dps"), ("_rad", "_deg"))
+_WORD = re.compile(r"(\w+=)?(\*?)([\w.]*)(\([^)]*\))?(!?)(?: |$)")
 
 
 class WrongPartError(ValueError):
@@ -57,32 +64,56 @@ class Entry:
     key: str
     """Empty where the parts of a block stand among their neighbours."""
     name: str
-    """Of the field or property."""
+    """Of the field or property, with dots for a part of one; empty where ``parts`` are the type's own."""
     kind: Any
     """Its type."""
     is_field: bool
     needed: bool
-    is_angle: bool
+    parts: tuple[Entry, ...] = ()
+    """What of the block is written; empty for all of it."""
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it turns into degrees."""
+        return any(self.name.endswith(ending) for ending, _ in _ANGLES)
 
 
 @cache
 def entries_of(kind: type) -> tuple[Entry, ...]:
     """The keys of a type's documents, in order."""
-    own = {one.name for one in fields(kind)}
     layout = WRITTEN_OF_LOGS.get(kind) or getattr(kind, "WRITTEN", None) or " ".join(one.name for one in fields(kind))
-    return tuple(_entry(kind, word, own) for word in layout.split())
+    return _entries(kind, layout)
 
 
-def _entry(kind: type, word: str, own: set[str]) -> Entry:
-    key, _, name = word.rstrip("!").lstrip("*").rpartition("=")
-    hint = get_type_hints(kind)[name] if name in own else _returned(getattr(kind, name))
-    is_angle = any(name.endswith(ending) for ending, _ in _ANGLES)
-    key = "" if word.startswith("*") else key or name_in_files(name)
-    return Entry(key, name, hint, name in own, word.endswith("!"), is_angle)
+def _entries(kind: type, layout: str) -> tuple[Entry, ...]:
+    return tuple(_entry(kind, *found) for found in _WORD.findall(layout) if any(found))
 
 
-def _returned(attribute: Any) -> Any:
-    function = getattr(attribute, "fget", None) or getattr(attribute, "func", attribute)
+def _entry(kind: type, key: str, star: str, name: str, parts: str, needed: str) -> Entry:
+    hint = kind
+    for one in name.split(".") if name else ():
+        hint = _type_of(part_of(hint), one) if hint is kind else _or_none(_type_of(part_of(hint), one))
+    inner = _entries(kind if not name else part_of(hint), parts[1:-1]) if parts else ()
+    is_field = name in {one.name for one in fields(kind)}
+    return Entry("" if star else key.rstrip("=") or name_in_files(name), name, hint, is_field, bool(needed), inner)
+
+
+def part_of(hint: Any) -> Any:
+    """The type of the blocks in a list, by name or where there may be none."""
+    args = [one for one in get_args(hint) if one not in (type(None), ...)]
+    return part_of(args[-1]) if args and get_origin(hint) is not Literal else hint
+
+
+def _or_none(hint: Any) -> Any:
+    return hint | None
+
+
+def _type_of(kind: type, name: str) -> Any:
+    """Of a field, a property or a method."""
+    if name in {one.name for one in fields(kind)}:
+        return get_type_hints(kind)[name]
+    attribute = getattr(kind, name)
+    function = getattr(attribute, "fget", attribute)
     return get_type_hints(function)["return"] if hasattr(function, "__globals__") else str
 
 
@@ -160,17 +191,30 @@ def _writer_of(kind: type) -> Callable[[Any], Json]:
     entries, schema = entries_of(kind), getattr(kind, "SCHEMA", None)
     header = {} if schema is None else {"schema": schema, "sccal_version": __version__}
 
-    def write(result: Any) -> Json:
-        document: Json = dict(header)
-        for one in entries:
-            value = getattr(result, one.name)
-            told = _converter().unstructure(
-                value() if callable(value) else _in_degrees(value) if one.is_angle else value
-            )
-            document |= {one.key: told} if one.key else told
-        return document
+    return lambda result: header | _written(result, entries)
 
-    return write
+
+def _written(result: Any, entries: tuple[Entry, ...]) -> Json:
+    document: Json = {}
+    for one in entries:
+        value = result
+        for name in one.name.split(".") if one.name else ():
+            value = None if value is None else getattr(value, name)
+        told = _in_part(value, one.parts) if one.parts else _whole(value, one)
+        document |= {one.key: told} if one.key else told
+    return document
+
+
+def _whole(value: Any, entry: Entry) -> Any:
+    return _converter().unstructure(value() if callable(value) else _in_degrees(value) if entry.is_angle else value)
+
+
+def _in_part(value: Any, parts: tuple[Entry, ...]) -> Any:
+    if isinstance(value, Mapping):
+        return {_text(name): _in_part(one, parts) for name, one in value.items()}
+    if isinstance(value, tuple):
+        return [_in_part(one, parts) for one in value]
+    return None if value is None else _written(value, parts)
 
 
 def _reader_of(kind: type) -> Callable[[Any, Any], Any]:
@@ -178,29 +222,42 @@ def _reader_of(kind: type) -> Callable[[Any, Any], Any]:
     further = getattr(kind, "further", None)
 
     def read(block: Any, _: Any) -> Any:
-        if not isinstance(block, Mapping):
-            raise WrongPartError("must be a block of names")
-
-        def part(key: str, of: Any) -> Any:
-            if key not in block:
-                raise WrongPartError("is missing", key)
-            with _at(key):
-                return _converter().structure(block[key], of)
-
-        found: dict[str, Any] = {}
-        for one in entries:
-            if one.is_field and not one.key:
-                found[one.name] = _converter().structure(block, one.kind)
-            elif one.is_field and (one.needed or block.get(one.key) is not None):
-                value = part(one.key, one.kind)
-                found[one.name] = _in_radians(value) if one.is_angle else value
-        found |= {} if further is None else further(block, part)
+        found = _found(_block(block), entries)
+        found |= {} if further is None else further(block, partial(_part, block))
         for field in fields(kind):
             if field.name not in found and not _has_default(field):
                 found[field.name] = not_told(hints[field.name])
         return kind(**found)
 
     return read
+
+
+def _block(found: Any) -> Mapping[str, Any]:
+    if not isinstance(found, Mapping):
+        raise WrongPartError("must be a block of names")
+    return found
+
+
+def _part(block: Mapping[str, Any], key: str, kind: Any) -> Any:
+    if key not in block:
+        raise WrongPartError("is missing", key)
+    with _at(key):
+        return _converter().structure(block[key], kind)
+
+
+def _found(block: Mapping[str, Any], entries: tuple[Entry, ...]) -> dict[str, Any]:
+    """The fields that a block tells."""
+    found: dict[str, Any] = {}
+    for one in entries:
+        if not one.name and block.get(one.key) is not None:
+            with _at(one.key):
+                found |= _found(_block(block[one.key]), one.parts)
+        elif one.is_field and not one.key:
+            found[one.name] = _converter().structure(block, one.kind)
+        elif one.is_field and (one.needed or block.get(one.key) is not None):
+            value = _part(block, one.key, one.kind)
+            found[one.name] = _in_radians(value) if one.is_angle else value
+    return found
 
 
 def _in_degrees(value: Any) -> Any:
@@ -284,11 +341,9 @@ def _read_list(value: Any, kind: Any) -> tuple[Any, ...]:
 
 
 def _read_names(value: Any, kind: Any) -> dict[Any, Any]:
-    if not isinstance(value, Mapping):
-        raise WrongPartError("must be a block of names")
     of_key, of_value = get_args(kind)
     found = {}
-    for key, one in value.items():
+    for key, one in _block(value).items():
         with _at(str(key)):
             if of_key is int and not key.lstrip("-").isdigit():
                 raise WrongPartError("is no whole number")

@@ -53,15 +53,6 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """What speaks for a finding, as a file has it in one block."""
-
-    evidence_nats: float
-    held_out_gain_nats: float
-    t: float
-
-
-@dataclass(frozen=True)
 class Finding:
     """One effect that was added to the model, in the order in which it was."""
 
@@ -91,7 +82,8 @@ class Finding:
     """Whether all of it was found, and put right, when the streams were brought onto one clock, before any fit."""
 
     WRITTEN: ClassVar[str] = (
-        "effect=name! title reference parameters=measured evidence indistinguishable_from aligned per_run advice "
+        "effect=name! title reference parameters=measured "
+        "evidence=(evidence_nats held_out_gain_nats t) indistinguishable_from aligned per_run advice "
         "drift_before_m drift_after_m ranking picture"
     )
 
@@ -100,16 +92,11 @@ class Finding:
         """The parameters, each with its unit."""
         return measured(self.parameters, self.units)
 
-    @property
-    def evidence(self) -> Evidence:
-        """What speaks for it."""
-        return Evidence(self.evidence_nats, self.held_out_gain_nats, self.t)
-
     @staticmethod
     def further(_: Mapping[str, Any], part: Any) -> dict[str, Any]:
         """What a document tells in other words."""
         parameters, units = unmeasured(part("parameters", Mapping[str, Measured]))
-        return {"parameters": parameters, "units": units, **vars(part("evidence", Evidence))}
+        return {"parameters": parameters, "units": units}
 
 
 @dataclass(frozen=True)
@@ -201,13 +188,6 @@ class Placebo:
 
 
 @dataclass(frozen=True)
-class HowHeldOut:
-    """How a diagnosis judged before and after."""
-
-    how: str
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """The whole story of some runs of one vehicle."""
 
@@ -235,11 +215,6 @@ class Diagnosis:
 
     SCHEMA: ClassVar[str] = "sccal.diagnosis/1"
     WRITTEN: ClassVar[str] = (
-        "vehicle runs! trust findings! taken_back not_excited detectable inseparable before! after! held_out "
-        "unexplained placebo parameters_before parameters_after noise=noises notices"
+        "vehicle runs! trust findings! taken_back not_excited detectable inseparable before! after! "
+        "held_out=(how=held_out_how) unexplained placebo parameters_before parameters_after noise=noises notices"
     )
-
-    @property
-    def held_out(self) -> HowHeldOut:
-        """How before and after were judged."""
-        return HowHeldOut(self.held_out_how)

@@ -79,6 +79,11 @@ class Spread:
     low: float
     high: float
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """From low to high."""
+        return self.low, self.high
+
 
 @dataclass(frozen=True)
 class BySeed:
@@ -98,14 +103,6 @@ class FaultInShort:
     quality: int | None
     from_s: float | None
     to_s: float | None
-
-
-@dataclass(frozen=True)
-class MeanRatio:
-    """A geometric mean and its interval."""
-
-    mean: float
-    interval_95: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -138,27 +135,10 @@ class VariantFigures:
     """Median and 5th to 95th percentile of rms_m."""
     end_spread_m: Spread
 
-    WRITTEN: ClassVar[str] = "rms_m rms_median_m rms_5_95_m end_m end_median_m end_5_95_m parameters=parameters_by_seed"
-
-    @property
-    def rms_median_m(self) -> float:
-        """Over the seeds."""
-        return self.rms_spread_m.median
-
-    @property
-    def rms_5_95_m(self) -> tuple[float, float]:
-        """Of 100 seeds 90 lie between."""
-        return self.rms_spread_m.low, self.rms_spread_m.high
-
-    @property
-    def end_median_m(self) -> float:
-        """Over the seeds."""
-        return self.end_spread_m.median
-
-    @property
-    def end_5_95_m(self) -> tuple[float, float]:
-        """Of 100 seeds 90 lie between."""
-        return self.end_spread_m.low, self.end_spread_m.high
+    WRITTEN: ClassVar[str] = (
+        "rms_m rms_median_m=rms_spread_m.median rms_5_95_m=rms_spread_m.interval end_m "
+        "end_median_m=end_spread_m.median end_5_95_m=end_spread_m.interval parameters=parameters_by_seed"
+    )
 
     @property
     def parameters_by_seed(self) -> Mapping[str, BySeed]:
@@ -198,19 +178,10 @@ class Cell:
     """The first seed in full."""
 
     WRITTEN: ClassVar[str] = (
-        "experiment=key title fault path measured seeds variants ratio=mean_ratio truth=truth_by_name "
+        "experiment=experiment.key title=experiment.title fault path measured seeds variants "
+        "ratio=ratio(mean=median interval_95=interval) truth=truth_by_name "
         "errors_percent=errors_by_name within_percent=within why_not"
     )
-
-    @property
-    def key(self) -> str:
-        """Of the experiment."""
-        return self.experiment.key
-
-    @property
-    def title(self) -> str:
-        """Of the experiment."""
-        return self.experiment.title
 
     @property
     def fault(self) -> FaultInShort:
@@ -224,11 +195,6 @@ class Cell:
     def variants(self) -> Mapping[str, VariantFigures]:
         """The figures by the filters' names in files."""
         return {FILTERS[variant == "with"]: self.figures[variant] for variant in VARIANTS}
-
-    @property
-    def mean_ratio(self) -> MeanRatio:
-        """The ratio with its interval."""
-        return MeanRatio(self.ratio.median, (self.ratio.low, self.ratio.high))
 
     @property
     def truth_by_name(self) -> Mapping[str, float] | None:

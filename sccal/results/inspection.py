@@ -284,14 +284,6 @@ class VehicleFacts:
 
 
 @dataclass(frozen=True)
-class Span:
-    """From when to when the run lasts."""
-
-    start_s: float
-    end_s: float
-
-
-@dataclass(frozen=True)
 class StandstillTold:
     """What the sensors read while the robot stands, and when it does."""
 
@@ -300,14 +292,6 @@ class StandstillTold:
     """(k, 2)"""
 
     WRITTEN: ClassVar[str] = "*facts spans_s"
-
-
-@dataclass(frozen=True)
-class ExcitedTold:
-    """What the drive shows, and by what that was asked."""
-
-    how: str | None
-    effects: tuple[Excited, ...]
 
 
 @dataclass(frozen=True)
@@ -337,8 +321,10 @@ class Inspection:
     verdict: Verdict = UNJUDGED
 
     WRITTEN: ClassVar[str] = (
-        "run path vehicle=vehicle_facts verdict calibratable unread span streams=streams_by_name fixes clock drive "
-        "standstill=standstill_told witnesses yaw_minus_course=course columns excited=excited_told findings notices"
+        "run path vehicle=vehicle_facts verdict calibratable unread "
+        "span=(start_s end_s) streams=streams_by_name fixes clock drive "
+        "standstill=standstill_told witnesses yaw_minus_course=course columns "
+        "excited=(how=shown_by effects=excited) findings notices"
     )
 
     @property
@@ -360,9 +346,19 @@ class Inspection:
         return VehicleFacts(v.name, self.declared, v.wheel_radius_m, v.track_m, v.ticks_per_rev, v.convention)
 
     @property
-    def span(self) -> Span:
-        """From when to when."""
-        return Span(*self.span_s)
+    def start_s(self) -> float:
+        """When the run begins."""
+        return self.span_s[0]
+
+    @property
+    def end_s(self) -> float:
+        """When it ends."""
+        return self.span_s[1]
+
+    @property
+    def shown_by(self) -> str | None:
+        """How it was asked what the drive shows; None where nothing could be."""
+        return self.excited_how if self.excited else None
 
     @property
     def streams_by_name(self) -> Mapping[str, StreamFacts]:
@@ -373,11 +369,6 @@ class Inspection:
     def standstill_told(self) -> StandstillTold | None:
         """The standstills with their times."""
         return None if self.standstill is None else StandstillTold(self.standstill, self.series.standing_s)
-
-    @property
-    def excited_told(self) -> ExcitedTold:
-        """What the drive shows."""
-        return ExcitedTold(self.excited_how if self.excited else None, self.excited)
 
 
 @dataclass(frozen=True)

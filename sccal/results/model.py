@@ -125,16 +125,6 @@ class RunNoise:
 
 
 @dataclass(frozen=True)
-class JudgedDrift:
-    """Drift of a model on data that fitted neither, and how it was judged."""
-
-    outage_end_rms_m: float | None
-    how: str
-
-    WRITTEN: ClassVar[str] = "outage_end_rms_m! how!"
-
-
-@dataclass(frozen=True)
 class JudgedModel:
     """What model.json holds."""
 
@@ -148,20 +138,15 @@ class JudgedModel:
     how: str
 
     SCHEMA: ClassVar[str] = "sccal.model/1"
-    WRITTEN: ClassVar[str] = "vehicle! parameters! effects! noise held_out"
+    WRITTEN: ClassVar[str] = "vehicle! parameters! effects! noise held_out=(outage_end_rms_m how!)"
 
     @property
     def noise(self) -> tuple[RunNoise, ...]:
         """The noise, run by run."""
         return tuple(RunNoise(run, noise) for run, noise in self.noises.items())
 
-    @property
-    def held_out(self) -> JudgedDrift:
-        """How it was judged."""
-        return JudgedDrift(self.outage_end_rms_m, self.how)
-
     @staticmethod
     def further(_: Mapping[str, Any], part: Any) -> dict[str, Any]:
         """What a document tells in other words."""
         noises = {one.run: one.noise for one in part("noise", tuple[RunNoise, ...])}
-        return {"noises": noises, **vars(part("held_out", JudgedDrift))}
+        return {"noises": noises}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import is_dataclass
 from enum import IntEnum
 from pathlib import Path
 from types import UnionType
@@ -14,7 +13,7 @@ import numpy as np
 from sccal.logs.streams import Vehicle
 from sccal.results.calibration import Calibration, VehicleCalibration
 from sccal.results.comparison import Comparison
-from sccal.results.converter import Json, entries_of
+from sccal.results.converter import Entry, Json, entries_of
 from sccal.results.diagnosis import Diagnosis
 from sccal.results.experiments import Experiments
 from sccal.results.gates import BatchOutcome
@@ -83,10 +82,33 @@ def _list(args: tuple[Any, ...], blocks: dict[str, Json]) -> Json:
 
 
 def _block(kind: type, blocks: dict[str, Json]) -> Json:
-    assert is_dataclass(kind)
     schema = getattr(kind, "SCHEMA", None)
-    known: Json = {} if schema is None else {"schema": {"const": schema}, "sccal_version": {"type": "string"}}
-    for one in entries_of(kind):
-        known |= {one.key: _of(one.kind, blocks)} if one.key else _block(one.kind, blocks)["properties"]
+    head: Json = {} if schema is None else {"schema": {"const": schema}, "sccal_version": {"type": "string"}}
     told = " ".join((kind.__doc__ or "").split())
-    return {"description": told, "type": "object", "properties": known, "required": list(known)}
+    return {"description": told, **_object(head | _parts(entries_of(kind), blocks))}
+
+
+def _parts(entries: tuple[Entry, ...], blocks: dict[str, Json]) -> Json:
+    known: Json = {}
+    for one in entries:
+        if not one.key:
+            known |= _parts(entries_of(one.kind), blocks)
+        else:
+            known[one.key] = _in_part(one.kind, one.parts, blocks) if one.parts else _of(one.kind, blocks)
+    return known
+
+
+def _in_part(kind: Any, parts: tuple[Entry, ...], blocks: dict[str, Json]) -> Json:
+    """Of a block, of each in a list or of each by name, only some parts."""
+    origin, args = get_origin(kind), get_args(kind)
+    if origin is tuple:
+        return {"type": "array", "items": _in_part(args[0], parts, blocks)}
+    if origin in (Union, UnionType):
+        return {"anyOf": [_in_part(args[0], parts, blocks), {"type": "null"}]}
+    if origin is not None:
+        return {"type": "object", "additionalProperties": _in_part(args[1], parts, blocks)}
+    return _object(_parts(parts, blocks))
+
+
+def _object(known: Json) -> Json:
+    return {"type": "object", "properties": known, "required": list(known)}

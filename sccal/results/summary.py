@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from sccal.arrays import Bools, Floats
 from sccal.logs.inputs import InputFile
-from sccal.results.calibration import Estimate, Fit, Outage, Status
+from sccal.results.calibration import Estimate, Fit, Outage
 from sccal.results.gates import GateResult
 from sccal.results.verdict import Verdict
 
@@ -22,34 +22,6 @@ class ThinPath:
 
     east_m: Floats
     north_m: Floats
-
-
-@dataclass(frozen=True)
-class InShort:
-    """An estimate, as far as a summary tells it."""
-
-    value: float
-    sigma: float
-    status: Status
-
-
-@dataclass(frozen=True)
-class OutageInShort:
-    """Drift without fixes; None where no window fits into the run."""
-
-    window_s: float
-    windows: int
-    rms_m: float | None
-    end_rms_m: float | None
-    percent_of_distance: float | None
-
-
-@dataclass(frozen=True)
-class InputHash:
-    """A file that a run was read from."""
-
-    name: str
-    sha256: str
 
 
 @dataclass(frozen=True)
@@ -76,30 +48,11 @@ class RunLine:
     path: ThinPath
 
     WRITTEN: ClassVar[str] = (
-        "run vehicle started verdict duration_s distance_m parameters=parameters_in_short effects=effects_in_short fit "
-        "outage=outage_in_short warnings results=run inputs=hashes"
+        "run vehicle started verdict duration_s distance_m parameters=parameters(value sigma status) "
+        "effects=effects(value sigma status) fit "
+        "outage=outage(window_s windows=count rms_m end_rms_m percent_of_distance) warnings results=run "
+        "inputs=inputs(name sha256)"
     )
-
-    @property
-    def parameters_in_short(self) -> Mapping[str, InShort]:
-        """The parameters, as far as a summary tells them."""
-        return _in_short(self.parameters)
-
-    @property
-    def effects_in_short(self) -> Mapping[str, Mapping[str, InShort]]:
-        """The effects, as far as a summary tells them."""
-        return {effect: _in_short(named) for effect, named in self.effects.items()}
-
-    @property
-    def outage_in_short(self) -> OutageInShort:
-        """The drift without its windows."""
-        o = self.outage
-        return OutageInShort(o.window_s, o.count, o.rms_m, o.end_rms_m, o.percent_of_distance)
-
-    @property
-    def hashes(self) -> tuple[InputHash, ...]:
-        """The files that the run was read from."""
-        return tuple(InputHash(one.name, one.sha256) for one in self.inputs)
 
 
 @dataclass(frozen=True)
@@ -243,17 +196,14 @@ class VehicleSummary:
     charts: tuple[Chart, ...]
     no_charts: tuple[NoChart, ...]
 
-    WRITTEN: ClassVar[str] = "vehicle=label file verdict=verdict_text runs parameters=parameters_in_short trends"
+    WRITTEN: ClassVar[str] = (
+        "vehicle=label file verdict=verdict_text runs parameters=parameters(value sigma status) trends"
+    )
 
     @property
     def verdict_text(self) -> str:
         """Empty without a file."""
         return str(self.verdict or "")
-
-    @property
-    def parameters_in_short(self) -> Mapping[str, InShort]:
-        """The parameters, as far as a summary tells them."""
-        return _in_short(self.parameters)
 
     @property
     def trends(self) -> tuple[Chart | NoChart, ...]:
@@ -287,7 +237,3 @@ class Summary:
 
     SCHEMA: ClassVar[str] = SUMMARY_SCHEMA
     WRITTEN: ClassVar[str] = "totals runs failures vehicles gates"
-
-
-def _in_short(estimates: Mapping[str, Estimate]) -> dict[str, InShort]:
-    return {key: InShort(one.value, one.sigma, one.status) for key, one in estimates.items()}
