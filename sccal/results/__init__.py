@@ -1,1 +1,1 @@
-"""Results as their files tell them, for whatever works on what was calibrated before."""
+"""Every type of result, and the one converter that writes them all as JSON and reads them again."""
