@@ -167,7 +167,7 @@ def test_the_trajectory_is_where_the_robot_was(tmp_path):
     motion = simulate_run(settings_from(["drive.path=general", "drive.duration_s=200", *SMALL], 1)).motion
     document = json.loads((folder / "truth.json").read_text())
     home = TangentPlane(document["origin"]["lat_deg"], document["origin"]["lon_deg"], 110.0)
-    here = TangentPlane(calibration.origin_lat_deg, calibration.origin_lon_deg, 110.0)
+    here = TangentPlane(calibration.origin.lat_deg, calibration.origin.lon_deg, 110.0)
     east, north = here.to_east_north(*home.to_lat_lon(motion.east_m, motion.north_m))
     path = calibration.trajectory
     true_t = motion.t_s + document["settings"]["clock"]["start_utc_s"]
