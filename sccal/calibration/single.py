@@ -24,6 +24,7 @@ from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.outage import run_with_outages
 from sccal.calibration.reference import judged_forward
 from sccal.calibration.status import effect_estimates, judge
+from sccal.calibration.stretches import Stretches, compare_stretches
 from sccal.calibration.unseen import unseen_parameters
 from sccal.calibration.verdict import judged_run
 from sccal.evidence.extension import FreeEffects
@@ -105,7 +106,9 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
         covariance[3, 3] += _variance_of_the_level(problem)
     drive = describe_drive(aligned, float(values[:2].mean()))
     lacking = look_for_missing(problem, values, options.heading_rate_hz)
-    constants = lacking.widened(covariance[:4, :4])
+    # What is missing by name owns up to itself; a contradiction without a name is told as one.
+    stretches = Stretches() if lacking.missing else compare_stretches(problem, values)
+    constants = stretches.widened(lacking.widened(covariance[:4, :4]))
     return (
         judged_run(
             Calibration(
@@ -123,7 +126,7 @@ def calibrate_run(run: Run, options: CalibrationOptions) -> tuple[Calibration, R
                 history=_history(honest),
                 residuals=_residuals(problem, final),
                 fixes=Fixes(aligned.fix_t_s, aligned.fix_east_m, aligned.fix_north_m, aligned.fix_quality),
-                notices=(*aligned.notices, *_doubts(problem, final)),
+                notices=(*aligned.notices, *_doubts(problem, final), *stretches.notices),
                 effects=_effects(problem, values[4:], covariance[4:, 4:]),
                 on_the_way=_trajectory(honest),
                 against_reference=judged,

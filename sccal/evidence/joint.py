@@ -216,16 +216,22 @@ class JointFit:
         shared = [_marginal(one, rows, k, self.prior) for one, rows in zip(self.runs, self.places.of_run, strict=True)]
         return disagreement(shared, self.mode, self.prior[:k, :k])
 
-    @cached_property
+    @property
     def misfit(self) -> float:
         """χ² per degree of freedom of the stretches' scores: 1 where noise and model are right, however many runs."""
+        chi2, directions = self.stretches_chi2
+        return chi2 / max(directions, 1)
+
+    @cached_property
+    def stretches_chi2(self) -> tuple[float, int]:
+        """χ² of the stretches' scores, and how many directions they show."""
         chi2, directions = 0.0, 0
         for one, rows in zip(self.runs, self.places.of_run, strict=True):
             scale = 1.0 / np.sqrt(np.diag(self.prior)[rows])
             for stretch in one.stretches:
                 more, seen = _chi2(stretch, self.values[rows], scale)
                 chi2, directions = chi2 + more, directions + seen
-        return chi2 / max(directions, 1)
+        return chi2, directions
 
     @property
     def dispersion(self) -> float:
