@@ -10,6 +10,7 @@ import pytest
 
 from sccal.errors import DataError
 from sccal.logs.nmea import parse_nmea_heading
+from sccal.logs.nmea.sentences import crc_32
 from sccal.logs.run import discover, read_run
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.write import gga, rmc, zda
@@ -237,3 +238,63 @@ def test_one_heading_is_too_few(tmp_path: Path) -> None:
     folder = run_folder(tmp_path, [*log(), hdt(1.0)])
     with pytest.raises(DataError, match=r"gnss\.nmea \(HDT\): 1 usable rows"):
         read_run(discover([folder])[0])
+
+
+def long_message(text: str) -> str:
+    return f"#{text}*{crc_32(text.encode()):08x}"
+
+
+OF_MAKERS = {
+    "HPR": sentence("GNHPR,120000.00,123.45,-0.40,0.00,4,21,0.00,0999"),
+    "TRA": sentence("GPTRA,120000.00,123.45,-0.40,0.00,4,23,0.00,0000"),
+    "PSSN,HRP": sentence("PSSN,HRP,120000.00,010624,123.45,,-0.40,0.17,,0.25,19,2,2.4,E"),
+    "PSAT,HPR": sentence("PSAT,HPR,120000.00,123.45,-0.40,,N"),
+    "PQTMTAR": sentence("PQTMTAR,1,120000.000,4,,0.752,-0.40,0.0,123.45,0.2,0.0,0.17,24"),
+    "PASHR,ATT": sentence("PASHR,ATT,561618.00,123.45,-0.40,0.0,0.001,0.002,0"),
+    "PSXN,23": sentence("PSXN,23,0.12,-0.40,123.45,0.00"),
+    "HDG": sentence("HCHDG,123.45,,,,"),
+    "HDM": sentence("HCHDM,123.45,M"),
+    "UNIHEADINGA": long_message(
+        'UNIHEADINGA,95,GPS,FINE,2316,561618000,0,0,18,10;SOL_COMPUTED,NARROW_INT,0.8,123.45,-0.40,0.0,0.17,0.25,"9",3'
+    ),
+    "HEADINGA": long_message(
+        'HEADINGA,COM2,0,61.5,FINESTEERING,2316,561618.000,02000000,0000,16248;SOL_COMPUTED,L1_INT,0.9,123.45,-0.40,0.0,'
+        '0.17,0.25,"4",15'
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OF_MAKERS)
+def test_a_makers_heading_is_read(name: str) -> None:
+    lines = [zda(NOON_S), fix(0), OF_MAKERS[name], fix(1), ""]
+    heading, notices = parse_nmea_heading("\n".join(lines).encode(), "gnss.nmea")
+    assert heading.source == f"gnss.nmea ({name})"
+    assert np.degrees(heading.yaw_rad) == pytest.approx([123.45])
+    assert heading.utc_s == pytest.approx([NOON_S])
+    assert heading.pitch_rad is None or np.degrees(heading.pitch_rad) == pytest.approx([-0.40])
+    assert any("magnetic" in notice.what for notice in notices) == (name in ("HDG", "HDM"))
+
+
+def test_a_makers_heading_without_a_solution_is_none() -> None:
+    lines = [zda(NOON_S), fix(0), sentence("GNHPR,120000.00,123.45,-0.40,0.00,0,3,0.00,0999"), ""]
+    with pytest.raises(DataError, match="without a heading"):
+        parse_nmea_heading("\n".join(lines).encode(), "gnss.nmea")
+
+
+def test_what_is_no_heading_is_named_where_there_is_none() -> None:
+    lines = [zda(NOON_S), fix(0), sentence("PXYZW,ATT,120000.00,1.0"), sentence("GNVTG,1.0,T,,M,1.5,N,2.8,K,D"), ""]
+    with pytest.raises(DataError, match=r"1 RMC, KSXT or VTG state a course.*PXYZW 1"):
+        parse_nmea_heading("\n".join(lines).encode(), "gnss.nmea")
+
+
+def test_headings_that_lost_their_tails_are_dropped() -> None:
+    whole = [sentence(f"GNHDT,{10 + number}.000,T") for number in range(6)]
+    lines = [
+        zda(NOON_S),
+        *(text for number in range(6) for text in (fix(number), whole[number])),
+        fix(6),
+        "$GNHDT,1",
+        "",
+    ]
+    heading, _ = parse_nmea_heading("\n".join(lines).encode(), "gnss.nmea")
+    assert np.degrees(heading.yaw_rad) == pytest.approx(np.arange(10, 16))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sccal.logs.nmea.kinds import LAYOUTS, NO_FIX, PLACED, READ, Kind, Position
+from sccal.logs.nmea.kinds import LAYOUTS, LONG, NO_FIX, PLACED, READ, Kind, Position
 from sccal.logs.nmea.sentences import find_sentences
 from tests.degrade.logs import NOON, every_kind
 
@@ -69,7 +69,8 @@ def test_every_row_is_found_by_its_name():
     rest = set(Kind) - {Kind.OTHER, *(Kind(kind) for kind in placed)}
     for kind in rest:
         name = LAYOUTS[kind].name
-        text = f"${name if name.startswith('P') else 'GN' + name},120000.00,,,,,,,,,,,,"
+        head = "#" if kind in LONG else "$" if name.startswith("P") else "$GN"
+        text = f"{head}{name},120000.00,,,,,,,,,,,,"
         assert find_sentences(text.encode()).kind.tolist() == [kind]
     assert set(LAYOUTS) == set(Kind) - {Kind.OTHER}
     assert set(READ) < set(LAYOUTS)

@@ -1,6 +1,7 @@
 """Headings out of NMEA sentences, for logs whose heading comes from two antennas or from a receiver with gyros.
 
-All are clockwise from true north ("ned"). Their fields stand in ``kinds``; what they mean:
+All are clockwise from north ("ned"), a compass's from magnetic north: the heading offset then holds the declination
+too. Their fields stand in ``kinds``, with what tells how good they are; what those mean that have a reader here:
 
 * THS is a measurement with mode A, autonomous (and D, P, R, F as in RMC, or nothing); E estimated, M manual,
   S simulator and V void are none.
@@ -19,20 +20,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import SIGMA_LIMIT_RAD
 from sccal.logs.nmea.kinds import LAYOUTS, READ_FOR_HEADINGS, UNTIMED, Heading, Kind
+from sccal.logs.nmea.quality import worded
 from sccal.logs.nmea.sentences import Sentences, talker_name
 from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
 
-HEADING_NAMES = ", ".join(LAYOUTS[kind].name for kind in reversed(READ_FOR_HEADINGS))
+_USUAL = (Kind.HDT, Kind.THS, Kind.KSXT, Kind.AVR, Kind.PASHR)
+HEADING_NAMES = ", ".join(LAYOUTS[kind].name for kind in dict.fromkeys((*_USUAL, *READ_FOR_HEADINGS)))
 
-_FIXED = 3
+_FIXED, _LOOSE = 3, 2
 _LEAST_SHARE = 0.1
 _LEAST_OF_RICHEST = 0.5
 _BASELINE_SHARE = 0.1
@@ -80,8 +84,8 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
     notices += order_notices
     chosen = timed[order]
     readings = readings.take(chosen)
-    what = "headings read, clockwise from true north"
-    if readings.kind in (Kind.AVR, Kind.KSXT) and readings.pitch_deg is not None:
+    what = f"headings read, clockwise from {_fields_of(readings.kind).north} north"
+    if readings.kind not in (Kind.PASHR, Kind.PSXN) and readings.pitch_deg is not None:
         what += "; their pitch is the inclination of the baseline between the antennas"
     notices.append(Notice(name, what, int(chosen.size)))
     return HeadingStream(
@@ -107,7 +111,9 @@ def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Readings | 
         if rows.size:
             own: list[Notice] = []
             name = f"{source} ({LAYOUTS[kind].name})"
-            found.append((_READERS[kind](dated.sentences.take(rows), rows, name, own), own))
+            found.append(
+                (_READERS.get(kind, partial(_claimed, kind))(dated.sentences.take(rows), rows, name, own), own)
+            )
     richest = max((readings.rows.size for readings, _ in found), default=0)
     if richest == 0:
         for _, own in found:
@@ -135,6 +141,19 @@ def _read(own: Sentences, rows: Ints, kind: Kind) -> _Readings:
         None if field is None else own.number(field) for field in (fields.pitch, fields.roll, fields.sigma)
     )
     return _Readings(kind, rows, own.number(fields.yaw), pitch, roll, sigma)
+
+
+def _claimed(kind: Kind, own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:
+    """Headings of a kind whose row in the table tells all that is to know."""
+    fields = _fields_of(kind)
+    readings = _read(own, rows, kind)
+    pitch, roll = (None if angle is None else _or_none(angle) for angle in (readings.pitch_deg, readings.roll_deg))
+    readings = replace(readings, pitch_deg=pitch, roll_deg=roll)
+    if fields.state is None:
+        return _plausible(own, readings, np.ones(rows.size, dtype=np.bool_), name, notices)
+    states = dict.fromkeys(fields.loose, _LOOSE) | dict.fromkeys(fields.fixed, _FIXED)
+    measured = _best_quality(worded(own, fields.state, states).astype(np.float64), name, own, notices)
+    return _plausible(own, readings, measured, name, notices)
 
 
 def _hdt(own: Sentences, rows: Ints, name: str, notices: list[Notice]) -> _Readings:

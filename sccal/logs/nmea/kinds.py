@@ -14,6 +14,20 @@ address, $PTNL's after the name that follows it. All qualities are told in the n
 * PASHR: Applanix POS MV V5 guide, table 20; NovAtel OEM7 and Trimble receiver help: time, heading, T, roll, pitch,
   heave, sigmas of roll, pitch and heading, quality. PASHR,POS: Ashtech.
 * PUBX,00: u-blox M8 protocol specification.
+* HPR: Unicore N4 reference commands: time, heading, pitch, roll, quality as in GGA, satellites, age, station. TRA: the
+  same fields, ComNav and older Unicore manuals.
+* PSSN,HRP: Septentrio AsteRx reference guide: time, date ddmmyy, heading, roll, pitch, their sigmas, satellites, mode
+  (0 none, 1 and 3 float, 2 and 4 fixed), magnetic variation.
+* PSAT,HPR: Hemisphere technical reference: time, heading, pitch, roll, N by satellites or G by gyro.
+* PQTMTAR: Quectel LC02H and LC29H protocol: version, time, quality, reserved, length of the baseline, pitch, roll,
+  heading, their sigmas, satellites.
+* PASHR,ATT: Ashtech and Spectra manuals: seconds of the GPS week, heading, pitch, roll, errors, 0 where ambiguities
+  are fixed.
+* PSXN,23: Kongsberg Seapath manual: roll positive with port up, pitch positive with bow up, heading, heave.
+* HDG, HDM: NMEA 0183: what a compass reads, clockwise from magnetic north.
+* UNIHEADINGA: Unicore N4 reference commands; HEADINGA, HEADING2A, DUALANTENNAHEADINGA: NovAtel OEM7 documentation. A
+  header with GPS week and time of week, then state, type of solution, length, heading, pitch, reserved, sigmas. They
+  begin with ``#`` and end in a CRC-32.
 
 Unicore's second antenna sends the usual sentences with an H at the end of the address.
 """
@@ -50,6 +64,18 @@ class Kind(IntEnum):
     RMC_H = 17
     GNS_H = 18
     GLL_H = 19
+    HPR = 20
+    TRA = 21
+    HRP = 22
+    PSAT_HPR = 23
+    TAR = 24
+    PASHR_ATT = 25
+    PSXN = 26
+    HDG = 27
+    HDM = 28
+    UNIHEADING = 29
+    HEADING = 30
+    DUAL_HEADING = 31
 
 
 NO_FIX = 0
@@ -158,6 +184,13 @@ class Heading:
     pitch: int | None = None
     roll: int | None = None
     sigma: int | None = None
+    state: int | None = None
+    """Field that tells how good the heading is; None where every one counts, or where a reader of its own decides."""
+    fixed: tuple[str, ...] = ()
+    """What stands there with fixed ambiguities, or where there are none to fix."""
+    loose: tuple[str, ...] = ()
+    """What stands there with a heading that may be degrees off. Anything else is none."""
+    north: Literal["true", "magnetic"] = "true"
 
 
 @dataclass(frozen=True)
@@ -170,16 +203,23 @@ class Layout:
     """Fields below which a sentence is not whole."""
     time: int | None = None
     """None: it belongs to the epoch among whose sentences it stands."""
+    clock: Literal["utc", "week_s", "week_ms"] = "utc"
+    """hhmmss, or seconds or milliseconds of the GPS week."""
     date: Date | None = None
     position: Position | None = None
     speed: Speed | None = None
     heading: Heading | None = None
 
 
+_SOLVED = ("NARROW_INT", "WIDE_INT", "L1_INT", "INS_RTKFIXED")
+_UNSOLVED = ("NARROW_FLOAT", "WIDE_FLOAT", "L1_FLOAT", "IONOFREE_FLOAT", "INS_RTKFLOAT", "PSRDIFF", "SINGLE")
+"""Types of solution in long messages, Unicore's and NovAtel's."""
+_LONG_HEADING = Heading(13, pitch=14, sigma=16, state=11, fixed=_SOLVED, loose=_UNSOLVED)
+
 LAYOUTS: dict[Kind, Layout] = {
     Kind.GGA: Layout(
         "GGA",
-        fewest=13,
+        fewest=6,
         time=1,
         position=Position(
             2, 4, quality=6, claim=_GGA, altitude_m=9, separation_m=11, hdop=8,
@@ -257,6 +297,37 @@ LAYOUTS: dict[Kind, Layout] = {
     Kind.AVR: Layout("PTNL,AVR", fewest=9, time=1, heading=Heading(2, pitch=4, roll=6)),
     Kind.THS: Layout("THS", fewest=2, heading=Heading(1)),
     Kind.HDT: Layout("HDT", fewest=1, heading=Heading(1)),
+    Kind.HPR: Layout(
+        "HPR", fewest=5, time=1, heading=Heading(2, pitch=3, state=5, fixed=("4",), loose=("1", "2", "5"))
+    ),
+    Kind.TRA: Layout(
+        "TRA", fewest=5, time=1, heading=Heading(2, pitch=3, state=5, fixed=("4",), loose=("1", "2", "5"))
+    ),
+    Kind.HRP: Layout(
+        "PSSN,HRP",
+        fewest=10,
+        time=1,
+        heading=Heading(3, roll=4, pitch=5, sigma=6, state=10, fixed=("2", "4"), loose=("1", "3")),
+    ),
+    Kind.PSAT_HPR: Layout(
+        "PSAT,HPR", fewest=5, time=1, heading=Heading(2, pitch=3, roll=4, state=5, fixed=("N", "G"))
+    ),
+    Kind.TAR: Layout(
+        "PQTMTAR", fewest=8, time=2, heading=Heading(8, pitch=6, sigma=11, state=3, fixed=("4",), loose=("5", "6"))
+    ),
+    Kind.PASHR_ATT: Layout(
+        "PASHR,ATT",
+        fewest=8,
+        time=2,
+        clock="week_s",
+        heading=Heading(3, pitch=4, state=8, fixed=("0",), loose=tuple("123456789")),
+    ),
+    Kind.UNIHEADING: Layout("UNIHEADINGA", fewest=17, time=5, clock="week_ms", heading=_LONG_HEADING),
+    Kind.HEADING: Layout("HEADINGA", fewest=17, time=6, clock="week_s", heading=_LONG_HEADING),
+    Kind.DUAL_HEADING: Layout("DUALANTENNAHEADINGA", fewest=17, time=6, clock="week_s", heading=_LONG_HEADING),
+    Kind.PSXN: Layout("PSXN,23", fewest=3, heading=Heading(3, pitch=2, roll=1)),
+    Kind.HDG: Layout("HDG", fewest=1, heading=Heading(1, north="magnetic")),
+    Kind.HDM: Layout("HDM", fewest=1, heading=Heading(1, north="magnetic")),
     Kind.VTG: Layout("VTG", fewest=7, speed=Speed(knots=5, kmph=7, told_by=9, holds_not="N")),
     Kind.GST: Layout("GST", fewest=8, time=1),
     Kind.ZDA: Layout("ZDA", fewest=4, time=1, date=Date((2, 3, 4), "dd,mm,yyyy")),
@@ -269,10 +340,15 @@ GST_SIGMAS, GST_BEARING = (3, 4, 6, 7), 5
 """Fields of GST: semi-major and semi-minor axis, north, east; and the bearing of the major axis."""
 READ_FOR_POSITIONS = (Kind.GGA, Kind.GNS, Kind.GGK, Kind.KSXT, Kind.RMC)
 """By how much they say about their quality."""
-READ_FOR_HEADINGS = (Kind.PASHR, Kind.AVR, Kind.KSXT, Kind.THS, Kind.HDT)
+READ_FOR_HEADINGS = (
+    *(Kind.PASHR, Kind.AVR, Kind.KSXT, Kind.HRP, Kind.UNIHEADING, Kind.HEADING, Kind.DUAL_HEADING, Kind.TAR),
+    *(Kind.PASHR_ATT, Kind.HPR, Kind.TRA, Kind.PSAT_HPR, Kind.THS, Kind.HDT, Kind.PSXN, Kind.HDG, Kind.HDM),
+)
 """The ones that say more about their quality first."""
 PLACED = tuple(kind for kind, layout in LAYOUTS.items() if layout.position is not None)
 """All that hold a position."""
+LONG = (Kind.UNIHEADING, Kind.HEADING, Kind.DUAL_HEADING)
+"""Messages that begin with ``#``, part fields by ``;`` too, and end in a CRC-32."""
 READ_FOR_SPEEDS = (Kind.RMC, Kind.KSXT, Kind.VTG)
 READ_FOR_DATES = (Kind.RMC, Kind.ZDA, Kind.KSXT, Kind.GGK)
 READ = tuple({*READ_FOR_POSITIONS, *READ_FOR_HEADINGS, *READ_FOR_SPEEDS, *READ_FOR_DATES, Kind.GST})

@@ -20,7 +20,7 @@ def stated_quality(own: Sentences, position: Position) -> Ints:
     if claim.form == "number":
         quality = _numbered(own, field, claim)
     elif claim.form == "word":
-        quality = _worded(own, field, claim.read)
+        quality = worded(own, field, claim.read)
     else:
         letters = own.letter(field)[:, None] if claim.form == "letter" else own.letters(field, _CONSTELLATIONS)
         quality = _best(letters, claim.read)
@@ -47,7 +47,8 @@ def _best(letters: Bytes, read: Mapping[str, int]) -> Ints:
     return stated
 
 
-def _worded(own: Sentences, field: int, read: Mapping[str, int]) -> Ints:
+def worded(own: Sentences, field: int, read: Mapping[str, int]) -> Ints:
+    """What each text in field ``field`` stands for (n,); -1 for any other."""
     begin, end = own.span(field)
     quality = np.full(begin.size, NOT_STATED, dtype=np.int64)
     for word, code in read.items():

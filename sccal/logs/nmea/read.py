@@ -14,10 +14,15 @@ from sccal.errors import DataError
 from sccal.logs.decimals import words_of
 from sccal.logs.nmea.fixes import read_fixes
 from sccal.logs.nmea.headings import HEADING_NAMES, read_heading
-from sccal.logs.nmea.kinds import LAYOUTS, READ
-from sccal.logs.nmea.sentences import Sentences, all_lower, find_sentences, kinds_in
+from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_SPEEDS
+from sccal.logs.nmea.sentences import Sentences, all_lower, find_sentences, kinds_in, names_of
 from sccal.logs.nmea.times import Dated, date_sentences
 from sccal.logs.streams import FixStream, HeadingStream, Notice
+
+_MOST_NAMES = 12
+_SHOWN_FROM, _SHOWN = 4096, 60
+_RARE = 0.2
+"""Sentences without checksum that are shorter than usual are cut where they are no larger a share of their kind."""
 
 
 def read_nmea(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
@@ -64,11 +69,16 @@ def parse_nmea_heading(
         DataError: no sentence, or no heading.
     """
     where = str(path or source)
-    dated, count, _ = _dated(raw, source, where)
+    dated, count, told = _dated(raw, source, where)
     notices: list[Notice] = []
     heading = read_heading(dated, source, notices)
     if heading is None:
-        why = "; ".join(str(notice) for notice in notices) or f"no {HEADING_NAMES}"
+        met = [str(notice) for notice in notices] or [f"no {HEADING_NAMES}"]
+        courses = int(kinds_in(dated.sentences.kind, READ_FOR_SPEEDS).sum())
+        if courses:
+            met.append(f"{courses} RMC, KSXT or VTG state a course over ground, which is no heading")
+        met += [str(notice) for notice in told if "passed over" in notice.what]
+        why = "; ".join(met)
         raise DataError(f"{where}: no heading in {count} sentences ({len(raw)} bytes): {why}")
     return heading, tuple(notices)
 
@@ -86,10 +96,20 @@ def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice
         raise DataError(f"{where}: is empty (0 bytes); log it again or remove the run")
     found = find_sentences(raw)
     if found.start.size == 0:
-        raise DataError(f"{where}: no NMEA sentence in {len(raw)} bytes; lines should hold $GNGGA,… sentences")
+        raise DataError(
+            f"{where}: no NMEA sentence in {len(raw)} bytes; lines should hold $GNGGA,… sentences, and the first is "
+            f"{_shown(raw)}"
+        )
     notices: list[Notice] = []
     dated = date_sentences(_whole_sentences(found, source, notices), source, notices)
     return dated, int(found.start.size), notices
+
+
+def _shown(raw: bytes) -> str:
+    """The beginning of the first line with anything in it, for messages."""
+    lines = raw[:_SHOWN_FROM].split()
+    text = lines[0][:_SHOWN].decode("ascii", errors="replace") if lines else ""
+    return "".join(letter if letter.isprintable() else "?" for letter in text) or "blank"
 
 
 def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Sentences:
@@ -101,6 +121,7 @@ def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Se
     cut = ~found.has_checksum & ~found.complete
     lower = (found.data[found.start + 1] > ord("Z")) & ~all_lower(words_of(found.data), found.start)
     short = ours & ~wrong & ~cut & ((found.fields < needed[found.kind]) | (~found.has_checksum & lower))
+    cut |= ours & ~wrong & ~short & _without_their_end(found)
     use: Bools = ours & ~wrong & ~cut & ~short
     bare = use & ~found.has_checksum
     other = ~ours & ~wrong & ~cut
@@ -109,7 +130,7 @@ def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Se
         (cut, "sentences cut in the middle dropped", "info"),
         (short, "sentences with missing fields dropped", "info"),
         (bare, "sentences without checksum read", "info"),
-        (other, "other sentences passed over", "info"),
+        (other, f"other sentences passed over ({_listed(found, other)})", "info"),
         (_odd_prefixes(found), "lines begin with something other than seconds: no receive time read", "warning"),
     ):
         count = int(rows.sum())
@@ -118,6 +139,31 @@ def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Se
             serious = severity == "warning" and count > 0.001 * found.start.size
             notices.append(Notice(source, what, count, where, "warning" if serious else "info"))
     return found if use.all() else found.take(np.flatnonzero(use))
+
+
+def _listed(found: Sentences, rows: Bools) -> str:
+    """The names of sentences, and how many there are of each."""
+    named = names_of(found, rows) if rows.any() else []
+    more = f", {len(named) - _MOST_NAMES} more names" if len(named) > _MOST_NAMES else ""
+    return ", ".join(f"{name} {count}" for name, count in named[:_MOST_NAMES]) + more
+
+
+def _without_their_end(found: Sentences) -> Bools:
+    """True where a sentence has no checksum though most of its kind do, or rarely few fields where none has one."""
+    bare = ~found.has_checksum
+    lost = np.zeros(bare.size, dtype=np.bool_)
+    if not bare.any():
+        return lost
+    for kind in np.unique(found.kind[bare]).tolist():
+        rows = np.flatnonzero(bare & (found.kind == kind))
+        with_one = int(((found.kind == kind) & ~bare).sum())
+        if with_one > rows.size:
+            lost[rows] = True
+            continue
+        counts, which, many = np.unique(found.fields[rows], return_inverse=True, return_counts=True)
+        few = (counts < counts[np.argmax(many)]) & (many < _RARE * rows.size)
+        lost[rows] = few[which]
+    return lost
 
 
 def _odd_prefixes(found: Sentences) -> Bools:

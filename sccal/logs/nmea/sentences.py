@@ -1,12 +1,14 @@
 """NMEA 0183 sentences in a byte buffer: found, checked and cut into fields with array operations.
 
-A sentence runs from ``$`` to a line end or the next ``$``; anything else between (binary messages, prompts) is passed
-over. Only the places of the bytes ``$ , * \\r \\n`` are looked at; fields are read when they are asked for.
+A sentence runs from ``$`` (a long message from ``#``) to a line end or the next ``$``; anything else between (binary
+messages, prompts) is passed over. Only the places of the bytes ``$ , * \\r \\n`` are looked at; fields are read when
+they are asked for.
 """
 
 from __future__ import annotations
 
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import PAD, Bytes, Decimals, Words, parse_decimals, read_decimals, words_of
 from sccal.logs.limits import TIME_LIMIT_S
-from sccal.logs.nmea.kinds import LAYOUTS, OF_SECOND_ANTENNA, Kind
+from sccal.logs.nmea.kinds import LAYOUTS, LONG, OF_SECOND_ANTENNA, Kind
 
 Kinds = NDArray[np.uint8]
 
@@ -50,12 +52,22 @@ _NAMES = {
     Kind.KSXT: _pattern(b"KSXT,"),
     Kind.GGK: _pattern(b"PTNLGGK,"),
     Kind.PUBX: _pattern(b"PUBX,00,"),
+    Kind.TAR: _pattern(b"PQTMTAR,"),
+    Kind.UNIHEADING: _pattern(b"UNIHEADI"),
+    Kind.HEADING: _pattern(b"HEADING"),
+    Kind.DUAL_HEADING: _pattern(b"DUALANTE"),
 }
-_TRIMBLE = _pattern(b"PTNL,")
-_TRIMBLE_NAMES = {Kind.AVR: _pattern(b"AVR,"), Kind.GGK: _pattern(b"GGK,")}
-"""In the field after the address ``$PTNL``."""
-_ASHTECH_POSITION = _pattern(b"POS,")
+_NAMED_AFTER = (
+    (_pattern(b"PTNL,"), {Kind.AVR: _pattern(b"AVR,"), Kind.GGK: _pattern(b"GGK,")}),
+    (_pattern(b"PSSN,"), {Kind.HRP: _pattern(b"HRP,")}),
+    (_pattern(b"PSAT,"), {Kind.PSAT_HPR: _pattern(b"HPR,")}),
+    (_pattern(b"PSXN,"), {Kind.PSXN: _pattern(b"23,")}),
+)
+"""Makers' addresses of four letters, and the names of sentences in the field after them."""
+_ASHTECH_NAMES = {Kind.PASHR_POS: _pattern(b"POS,"), Kind.PASHR_ATT: _pattern(b"ATT,")}
 """In the field after the address ``$PASHR``."""
+_LONG_NAMES = (b"HEADINGA,", b"HEADING2A,")
+"""Ends of the names of long messages; where none is in a file, ``#`` and ``;`` part nothing."""
 _TALKER_BITS = np.uint64(16)
 _LONG_ADDRESSES = {kind: _pattern(f"{first.name}H,".encode()) for kind, first in OF_SECOND_ANTENNA.items()}
 """After the talker."""
@@ -166,11 +178,13 @@ def find_sentences(raw: bytes) -> Sentences:
     size = len(raw)
     data = np.frombuffer(raw + bytes(PAD), dtype=np.uint8)
     body = data[:size]
-    marks = np.concatenate((*_marks(body), (size, size)))
+    long_ones = b"#" in raw and any(name in raw for name in _LONG_NAMES)
+    marks = np.concatenate((*_marks(body, b"*$\r\n#;" if long_ones else b"*$\r\n"), (size, size)))
     mark_byte = data[marks]
-    major = np.flatnonzero(mark_byte != ord(","))
+    major = np.flatnonzero((mark_byte != ord(",")) & (mark_byte != ord(";")) if long_ones else mark_byte != ord(","))
     byte = mark_byte[major]
-    dollar = np.flatnonzero(byte[:-1] == ord("$"))
+    begins = (byte == ord("$")) | (byte == ord("#")) if long_ones else byte == ord("$")
+    dollar = np.flatnonzero(begins[:-1])
     dollar = dollar[marks[major[dollar + 1]] - marks[major[dollar]] >= _SHORTEST_SENTENCE]
     start = marks[major[dollar]]
     starred = byte[dollar + 1] == ord("*")
@@ -178,7 +192,7 @@ def find_sentences(raw: bytes) -> Sentences:
     stop = marks[mark_of_stop]
     end_index = np.minimum(dollar + 1 + starred, major.size - 1)
     end = marks[major[end_index]]
-    complete = (end < size) & (byte[end_index] != ord("$"))
+    complete = (end < size) & ~begins[end_index]
     end = np.minimum(end, start + _LONGEST_SENTENCE)
     star = np.where(starred, stop, size)
     stop = np.minimum(stop, end)
@@ -188,7 +202,7 @@ def find_sentences(raw: bytes) -> Sentences:
     high, low = _HEX[data[np.minimum(star + 1, size)]], _HEX[data[np.minimum(star + 2, size)]]
     has_checksum = (star + 2 < end) & (high < 16) & (low < 16)
     right = has_checksum & (_sums(data, start, stop) == high * 16 + low) & (stop > start + 1)
-    long = has_checksum & (kind == Kind.KSXT) & (star + LONG_CHECKSUM_DIGITS < end)
+    long = has_checksum & kinds_in(kind, (Kind.KSXT, *LONG)) & (star + LONG_CHECKSUM_DIGITS < end)
     long &= _with_long_checksum(raw, long & (_HEX[data[np.minimum(star + 3, size)]] < 16), start, star)
     right |= long
     folded = np.flatnonzero(has_checksum & ~right & all_lower(words, start))
@@ -225,6 +239,25 @@ def all_lower(words: Words, start: Ints) -> Bools:
     return lower
 
 
+def names_of(found: Sentences, rows: Bools) -> list[tuple[str, int]]:
+    """What the sentences at ``rows`` (n) call themselves, and how many there are of each, the most first."""
+    heads, counts = np.unique(words_of(found.data)[found.start[rows] + 1], return_counts=True)
+    named: Counter[str] = Counter()
+    for head, count in zip(heads.tolist(), counts.tolist(), strict=True):
+        named[_name_in(head.to_bytes(8, "little").decode("latin-1").upper())] += count
+    return named.most_common()
+
+
+def _name_in(head: str) -> str:
+    """The name in the first eight letters of a sentence; a maker's own with what follows it."""
+    address, _, rest = head.partition(",")
+    if address.startswith("P"):
+        after = rest.partition(",")[0]
+        return f"{address},{after}" if address and "," in rest and after.isalnum() else address
+    usual = len(address) == 5 and address.isalpha()
+    return address[2:] if usual else "".join(letter if letter.isprintable() else "?" for letter in address)
+
+
 def formatters(found: Sentences) -> NDArray[np.bytes_]:
     """The three letters after the talker (n,), upper case; empty for what is not a five-letter address."""
     address = found.data[found.start[:, None] + np.arange(1, 7)]
@@ -236,13 +269,13 @@ def formatters(found: Sentences) -> NDArray[np.bytes_]:
     return np.where(usual, kinds, b"").astype("S3")
 
 
-def _marks(body: Bytes) -> Iterator[Ints]:
-    """Places of the bytes that part fields or sentences, in pieces that stay in the processor's cache."""
+def _marks(body: Bytes, others: bytes) -> Iterator[Ints]:
+    """Places of commas and of other bytes that part fields or sentences, in pieces that stay in a cache."""
     marked, same = np.empty(_PIECE, dtype=np.bool_), np.empty(_PIECE, dtype=np.bool_)
     for begin in range(0, body.size, _PIECE):
         piece = body[begin : begin + _PIECE]
         found = np.equal(piece, ord(","), out=marked[: piece.size])
-        for byte in b"*$\r\n":
+        for byte in others:
             found |= np.equal(piece, byte, out=same[: piece.size])
         yield np.flatnonzero(found) + begin
 
@@ -270,10 +303,11 @@ def _kinds(words: Words, start: Ints, stop: Ints) -> tuple[Kinds, NDArray[np.uin
     if own.size:
         for name, pattern in _NAMES.items():
             kind[own[_reads(address[own], pattern)]] = name
-        trimble = own[_reads(address[own], _TRIMBLE)]
-        for name, pattern in _TRIMBLE_NAMES.items():
-            rows = trimble[_reads(words[start[trimble] + 6], pattern)]
-            kind[rows], shift[rows] = name, 1
+        for maker, names in _NAMED_AFTER:
+            made = own[_reads(address[own], maker)]
+            for name, pattern in names.items():
+                rows = made[_reads(words[start[made] + 6], pattern)]
+                kind[rows], shift[rows] = name, 1
         for name, pattern in _LONG_ADDRESSES.items():
             kind[own[_reads(address[own] >> _TALKER_BITS, pattern)]] = name
     return kind, talker, shift
@@ -299,7 +333,7 @@ def crc_32(text: bytes) -> int:
 
 
 def _with_long_checksum(raw: bytes, may: Bools, start: Ints, star: Ints) -> Bools:
-    """True where a KSXT ends in the eight digits of a right CRC-32 instead of two, as ComNav and Unicore write it."""
+    """True where a sentence ends in the eight digits of a right CRC-32 instead of two."""
     right = np.zeros(may.size, dtype=np.bool_)
     for row in np.flatnonzero(may).tolist():
         try:
@@ -317,7 +351,8 @@ def _with_pashr_told_apart(data: Bytes, marks: Ints, first_mark: Ints, kind: Kin
     initial = _upper(data[begin])
     named = (initial >= 65) & (initial <= 90)
     kind[rows[named]] = Kind.OTHER
-    kind[rows[named & _reads(words_of(data)[begin], _ASHTECH_POSITION)]] = Kind.PASHR_POS
+    for name, pattern in _ASHTECH_NAMES.items():
+        kind[rows[named & _reads(words_of(data)[begin], pattern)]] = name
     return kind
 
 

@@ -26,6 +26,8 @@ from sccal.logs.streams import Notice
 
 DAY_S = 86400.0
 ROLLOVER_DAYS = 1024 * 7
+LEAP_SECONDS = 18.0
+"""GPS time minus UTC since 2017 (IERS Bulletin C 52 and later: none since), for messages in GPS time."""
 UNIX_FROM_S = 1e9
 """Receive times from here on (2001) are Unix time; smaller ones count from an arbitrary zero."""
 
@@ -116,10 +118,14 @@ def times_of_day(sentences: Sentences, kinds: Iterable[Kind]) -> Floats:
     """(n) seconds since midnight by sentences of some kinds; NaN where no time is stated or the field is none."""
     tod_s = np.full(sentences.start.size, np.nan)
     kinds = [kind for kind in kinds if LAYOUTS[kind].time is not None]
-    for field in {LAYOUTS[kind].time for kind in kinds}:
+    for field, clock in {(LAYOUTS[kind].time, LAYOUTS[kind].clock) for kind in kinds}:
         assert field is not None
-        rows = np.flatnonzero(kinds_in(sentences.kind, [kind for kind in kinds if LAYOUTS[kind].time == field]))
-        if rows.size:
+        alike = [kind for kind in kinds if (LAYOUTS[kind].time, LAYOUTS[kind].clock) == (field, clock)]
+        rows = np.flatnonzero(kinds_in(sentences.kind, alike))
+        if rows.size and clock != "utc":
+            of_week = sentences.take(rows).number(field) / (1000.0 if clock == "week_ms" else 1.0)
+            tod_s[rows] = np.round((of_week - LEAP_SECONDS) % DAY_S, 3)
+        elif rows.size:
             stamps = kinds_in(sentences.kind[rows], _STAMPED)
             tod_s[rows] = _seconds_of_day(sentences.take(rows).decimals(field), stamps)
     return tod_s
