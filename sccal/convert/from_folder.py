@@ -16,11 +16,13 @@ from sccal.logs.ahrs import ahrs_table
 from sccal.logs.encoder import encoder_table
 from sccal.logs.gnss_csv import gnss_table
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
+from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import find_sentences
 from sccal.logs.nmea.times import date_sentences
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import Notice
 from sccal.logs.table import Table
+from sccal.logs.text import as_utf8
 
 _DAY_S = 86400.0
 _LOOK_BYTES, _LOOK_ROWS = 1 << 16, 200
@@ -95,7 +97,8 @@ def nmea_lines(raw: bytes, run_t_s: Floats, path: Path, notices: list[Notice]) -
 
     A log without dates is put on the day of the run, whose times are ``run_t_s``.
     """
-    found = find_sentences(raw)
+    raw = as_utf8(raw)
+    found = with_receive_times(find_sentences(raw), path.name, [])
     mark = b"\n" if b"\n" in raw else b"\r"
     texts = [line[line.find(b"$") :].strip(b" \t\r\n\0") if b"$" in line else b"" for line in raw.split(mark)]
     broken = [at for at, text in enumerate(texts) if text and not _is_text(text)]

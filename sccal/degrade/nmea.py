@@ -19,8 +19,10 @@ from sccal.degrade.faults import FaultedFixes, Faults, fault_fixes, filled_times
 from sccal.degrade.rewriting import Plan, rewritten_piece
 from sccal.errors import DataError
 from sccal.logs.nmea.kinds import LAYOUTS, PLACED, Kind
+from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import Sentences, find_sentences, formatters, kinds_in
 from sccal.logs.reference import ReferenceRows
+from sccal.logs.text import as_utf8
 
 _PIECE_BYTES = 1 << 20
 _THREADS = 2
@@ -69,6 +71,7 @@ def degrade_nmea(raw: bytes, faults: Faults, span_s: tuple[float, float] | None,
         DataError: no position in the log, or windows on a clock that its times do not share.
         UsageError: a window outside the run.
     """
+    raw = as_utf8(raw)
     pieces = list(_pieces(raw))
     with ThreadPoolExecutor(_THREADS) as pool:
         collected = list(pool.map(lambda piece: _collected(raw[piece[0] : piece[1]]), pieces))
@@ -99,7 +102,7 @@ def degrade_nmea(raw: bytes, faults: Faults, span_s: tuple[float, float] | None,
         if own.row.size == 0 and not faults.gst:
             return piece, Counter()
         return rewritten_piece(
-            find_sentences(piece), len(piece), own, epoch_of[ends[number] - own.row.size : ends[number]], plan
+            _found(piece), len(piece), own, epoch_of[ends[number] - own.row.size : ends[number]], plan
         )
 
     with ThreadPoolExecutor(_THREADS) as pool:
@@ -109,8 +112,12 @@ def degrade_nmea(raw: bytes, faults: Faults, span_s: tuple[float, float] | None,
 
 
 def _collected(piece: bytes) -> tuple[Holders, tuple[Floats, Floats], Counter[str]]:
-    found = find_sentences(piece)
+    found = _found(piece)
     return find_holders(found), zda_days(found), _kinds(found)
+
+
+def _found(piece: bytes) -> Sentences:
+    return with_receive_times(find_sentences(piece), "", [])
 
 
 def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:

@@ -15,9 +15,11 @@ from sccal.logs.decimals import words_of
 from sccal.logs.nmea.fixes import read_fixes
 from sccal.logs.nmea.headings import HEADING_NAMES, read_heading
 from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_SPEEDS
+from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import Sentences, all_lower, find_sentences, kinds_in, names_of
 from sccal.logs.nmea.times import Dated, date_sentences
 from sccal.logs.streams import FixStream, HeadingStream, Notice
+from sccal.logs.text import as_utf8
 
 _MOST_NAMES = 12
 _SHOWN_FROM, _SHOWN = 4096, 60
@@ -94,13 +96,14 @@ def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice
     """The sentences that can be relied on with their epochs, and how many sentences there were."""
     if not raw:
         raise DataError(f"{where}: is empty (0 bytes); log it again or remove the run")
-    found = find_sentences(raw)
+    found = find_sentences(as_utf8(raw))
     if found.start.size == 0:
         raise DataError(
             f"{where}: no NMEA sentence in {len(raw)} bytes; lines should hold $GNGGA,… sentences, and the first is "
             f"{_shown(raw)}"
         )
     notices: list[Notice] = []
+    found = with_receive_times(found, source, notices)
     dated = date_sentences(_whole_sentences(found, source, notices), source, notices)
     return dated, int(found.start.size), notices
 
@@ -131,7 +134,7 @@ def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Se
         (short, "sentences with missing fields dropped", "info"),
         (bare, "sentences without checksum read", "info"),
         (other, f"other sentences passed over ({_listed(found, other)})", "info"),
-        (_odd_prefixes(found), "lines begin with something other than seconds: no receive time read", "warning"),
+        (_odd_prefixes(found), "lines begin with something that is no time: no receive time read", "warning"),
     ):
         count = int(rows.sum())
         if count:
