@@ -39,14 +39,14 @@ def tables_of_folder(source: RunSource) -> RunTables:
     run, listed, folder = read_run(source), source.folder, source.path
     assert listed is not None
     notices = earlier_notices(folder)
-    encoder = _log_table(encoder_table, folder / ENCODER_FILE, notices)
+    encoder = _log_table(encoder_table, listed.file(ENCODER_FILE), notices)
     ahrs = gnss = nmea = None
     if AHRS_FILE in listed.there:
-        ahrs = _log_table(ahrs_table, folder / AHRS_FILE, notices)
+        ahrs = _log_table(ahrs_table, listed.file(AHRS_FILE), notices)
     if listed.fix_file == NMEA_FILE:
-        nmea = nmea_lines((folder / NMEA_FILE).read_bytes(), encoder.t_s, folder / NMEA_FILE, notices)
+        nmea = nmea_lines(listed.file(NMEA_FILE).read_bytes(), encoder.t_s, listed.file(NMEA_FILE), notices)
     else:
-        gnss = _log_table(gnss_table, folder / GNSS_FILE, notices)
+        gnss = _log_table(gnss_table, listed.file(GNSS_FILE), notices)
     return RunTables(
         name=source.name,
         path=folder,

@@ -15,6 +15,7 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.degrade.edits import Bytes, Edits
 from sccal.errors import DataError
 from sccal.logs.decimals import PAD, Digits, read_digits, write_decimals
+from sccal.logs.dialect import has_decimal_commas
 
 _MOST_PLACES = 13
 _LARGEST = 9e17
@@ -51,8 +52,10 @@ class Sheet:
                 break
         else:
             raise DataError(f"{name}: no header line; the first line names the columns, such as t,yaw_deg")
-        self._separator = next((mark for mark in ",;\t" if mark in text), ",")
+        self._separator = max(",;\t", key=text.count)
         self.names = [one.strip().strip('"').strip() for one in text.split(self._separator)]
+        if has_decimal_commas(raw[first:], self._separator):
+            raise DataError(f"{name}: has decimal commas; write points (sccal convert does, there and back)")
         self._lines(min(first, len(raw)), len(raw))
 
     def _lines(self, first: int, size: int) -> None:

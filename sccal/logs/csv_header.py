@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from sccal.errors import DataError
+from sccal.logs.text import as_utf8
 
 LINE_LIMIT_BYTES = 64 * 1024
 COLUMN_LIMIT = 1000
 _CHUNK_BYTES = 1 << 20
+_SEPARATOR_LINE = re.compile(r"(?i:sep)=.?")
+"""What spreadsheets write first: the separator of all that follows."""
 _BLANKS = b"\0 \t\r\n"
 
 
@@ -19,6 +23,7 @@ def split_header(data: bytes, path: Path) -> tuple[list[str], str, int, int]:
         DataError: no header, or one that no log has.
     """
     start = line = 0
+    told = ""
     while start < len(data):
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end
@@ -29,14 +34,16 @@ def split_header(data: bytes, path: Path) -> tuple[list[str], str, int, int]:
                 "this is not a CSV file"
             )
         text = data[start:end].decode("utf-8", errors="replace").strip()
-        if text and not text.startswith("#"):
+        if _SEPARATOR_LINE.fullmatch(text):
+            told = text[4:] or "\t"
+        elif text and not text.startswith("#"):
             break
         start = end + 1
     else:
         raise DataError(
             f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
         )
-    separator = next((mark for mark in ",;\t" if mark in text), ",")
+    separator = told if told and told in text else max(",;\t", key=text.count)
     names = [name.strip().strip('"').strip() for name in text.split(separator)]
     if len(names) > COLUMN_LIMIT:
         raise DataError(f"{path}: line {line} names {len(names)} columns, more than {COLUMN_LIMIT}; this is not a log")
@@ -69,7 +76,7 @@ def require_csv(path: Path) -> None:
                 return
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
-    if begin.startswith((b"\xff\xfe", b"\xfe\xff")) or (b"\n" not in begin and b"\r" in begin):
+    if as_utf8(begin) is not begin or (b"\n" not in begin and b"\r" in begin):
         return  # for the reader of tables to say, or to take
     if len(begin) == _CHUNK_BYTES:
         begin += b"\nt"  # where all of it is comments, the header comes later

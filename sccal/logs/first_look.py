@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sccal.errors import DataError
-from sccal.logs.formats import FOLDER_FILES, message_format
+from sccal.logs.formats import FOLDER_FILES, message_format, run_files_in
 
 
 def require_any_log(paths: Sequence[Path]) -> None:
@@ -31,7 +31,8 @@ def require_log(path: Path) -> None:
     if messages is not None and messages.look is not None:
         messages.look(path)
     looks = {one.name: one.look for one in FOLDER_FILES if one.look is not None}
-    folder = path.parent if path.name in looks else path
+    folder = path.parent if path.name.lower() in looks else path
+    there = run_files_in([entry.name for entry in folder.iterdir()]) if folder.is_dir() else {}
     for name, look in looks.items():
-        if (folder / name).is_file():
-            look(folder / name)
+        if name in there and (folder / there[name]).is_file():
+            look(folder / there[name])

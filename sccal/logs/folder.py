@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
 from sccal.errors import DataError
-from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag
+from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag, run_files_in
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
 
 _FEWEST_ROWS = 2
+_MOST_OTHERS = 8
 _ANY_FIXES = f"{NMEA_FILE} (or {GNSS_FILE})"
 
 
@@ -27,6 +28,14 @@ class RunFolder:
     """Run files that are no regular files, and are not opened."""
     is_bag: bool = False
     """Whether the folder is one ROS 2 bag, and none of the run files is there."""
+    spelled: Mapping[str, str] = field(default_factory=dict)
+    """How the folder spells a run file's name, where not as the contract does."""
+    others: tuple[str, ...] = ()
+    """Files that may be logs under other names, for messages."""
+
+    def file(self, name: str) -> Path:
+        """Where a run file is."""
+        return self.path / self.spelled.get(name, name)
 
     @property
     def fix_file(self) -> str:
@@ -36,7 +45,7 @@ class RunFolder:
     @property
     def wheel_path(self) -> Path:
         """The file that the wheels are read from."""
-        return self.path / (self._first(WHEELS) or self._lacking(ENCODER_FILE))
+        return self.file(self._first(WHEELS) or self._lacking(ENCODER_FILE))
 
     def require_all(self) -> None:
         """Raise DataError with what the folder lacks for a calibration."""
@@ -48,12 +57,13 @@ class RunFolder:
         if missing:
             found = ", ".join(self.there) or "none of the run files"
             odd = f"; not a regular file: {', '.join(self.odd)}" if self.odd else ""
-            raise DataError(f"{self.path}: lacks {', '.join(missing)}; found {found}{odd}")
+            others = f"; not read: {', '.join(self.others)}" if self.others else ""
+            raise DataError(f"{self.path}: lacks {', '.join(missing)}; found {found}{odd}{others}")
 
     def wheels(self, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notice, ...]]:
         """The wheels, repaired by what the vehicle declares."""
         path = self.wheel_path
-        wheels, notices = WHEELS[path.name](path, vehicle)
+        wheels, notices = WHEELS[self._first(WHEELS)](path, vehicle)
         require_rows(path, wheels.t_s.size, notices)
         return wheels, notices
 
@@ -61,7 +71,7 @@ class RunFolder:
         """The heading: of the AHRS, and where there is none the receiver's own."""
         name = self._first(HEADINGS) or self._lacking(AHRS_FILE)
         try:
-            heading, notices = HEADINGS[name](self.path / name)
+            heading, notices = HEADINGS[name](self.file(name))
         except DataError as error:
             if name == AHRS_FILE:
                 raise
@@ -73,7 +83,7 @@ class RunFolder:
     def fixes(self) -> tuple[FixStream, tuple[Notice, ...]]:
         """The fixes; a second file with fixes is told, and not read."""
         name = self.fix_file or self._lacking(_ANY_FIXES)
-        fixes, notices = FIXES[name](self.path / name)
+        fixes, notices = FIXES[name](self.file(name))
         others = [other for other in self.there if other in FIXES and other != name]
         notices = (*(Notice(other, f"file not read because {name} is there too", 1) for other in others), *notices)
         require_rows(self.path / name, fixes.lat_deg.size, notices)
@@ -87,12 +97,16 @@ class RunFolder:
 
 
 def listed_folder(path: Path) -> RunFolder:
-    """List a run's folder."""
+    """List a run's folder; capitals in the names of its files do not matter."""
     names = {entry.name for entry in path.iterdir()}
-    regular = {name: (path / name).is_file() for name in RUN_FILES if name in names}
+    actual = run_files_in(names)
+    regular = {name: (path / actual[name]).is_file() for name in RUN_FILES if name in actual}
     there = tuple(name for name in regular if regular[name])
-    odd = tuple(name for name in regular if not regular[name])
-    return RunFolder(path, there, odd, not there and are_of_a_bag(names))
+    odd = tuple(actual[name] for name in regular if not regular[name])
+    spelled = {name: theirs for name, theirs in actual.items() if theirs != name}
+    known = {*actual.values(), *(name for name in names if name.lower().endswith((".toml", ".html", ".json")))}
+    others = tuple(sorted(name for name in names - known if (path / name).is_file() and not name.startswith(".")))
+    return RunFolder(path, there, odd, not there and are_of_a_bag(names), spelled, others[:_MOST_OTHERS])
 
 
 def require_rows(path: Path | str, usable: int, notices: Sequence[Notice]) -> None:

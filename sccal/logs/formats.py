@@ -116,11 +116,30 @@ ROS1 = MessageFormat(".bag", _BREAK, _ros1)
 MESSAGE_FORMATS = (MCAP, ROS2, ROS1)
 MESSAGE_SUFFIXES = tuple(one.suffix for one in MESSAGE_FORMATS)
 
+NO_LOGS = {
+    ".bin": "an autopilot's log (ArduPilot .bin) is not read: write its wheel encoders, heading and fixes as the files "
+    "above",
+    ".ulg": "an autopilot's log (PX4 .ulg) is not read: write its wheels, heading and fixes as the files above",
+    ".bag.active": "a ROS 1 bag that was not closed: `rosbag reindex` mends it, then name it .bag",
+    ".gz": "compressed: `gunzip` it first",
+    ".bz2": "compressed: `bunzip2` it first",
+    ".zst": "compressed: `zstd -d` it first",
+    ".zstd": "compressed: `zstd -d` it first, and name the result .mcap or .db3",
+    ".gpx": "a .gpx track holds too few decimals and no quality: log NMEA, or write gnss.csv",
+}
+"""What to do about files that are no runs, by the ends of their names."""
+
 
 def message_format(path: Path) -> MessageFormat | None:
     """The row of a file that is a run on its own; None for any other file and for folders."""
     suffix = path.suffix.lower()
     return next((one for one in MESSAGE_FORMATS if one.suffix == suffix and path.is_file()), None)
+
+
+def run_files_in(names: Collection[str]) -> dict[str, str]:
+    """Which of a folder's names are run files, by the contract's name; capitals do not matter, an exact name does."""
+    found = {name.lower(): name for name in sorted(names)}
+    return {name: name if name in names else found[name] for name in RUN_FILES if name in found}
 
 
 def are_of_a_bag(names: Collection[str]) -> bool:

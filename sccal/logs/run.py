@@ -6,18 +6,30 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
+from itertools import islice
+from pathlib import Path, PurePath
 
 from sccal.errors import DataError, Failure, UsageError
 from sccal.logs.folder import RunFolder, listed_folder, require_rows
-from sccal.logs.formats import MCAP, MESSAGE_SUFFIXES, ROS2, RUN_FILES, are_of_a_bag, message_format
+from sccal.logs.formats import (
+    MCAP,
+    MESSAGE_SUFFIXES,
+    NO_LOGS,
+    ROS2,
+    RUN_FILES,
+    are_of_a_bag,
+    message_format,
+    run_files_in,
+)
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
 from sccal.logs.messages.read import read_message_log
-from sccal.logs.names import ENCODER_FILE, VEHICLE_FILE, natural_key
+from sccal.logs.names import BAG_FILE, ENCODER_FILE, VEHICLE_FILE, natural_key
 from sccal.logs.options import ReadOptions
 from sccal.logs.reference import read_reference
 from sccal.logs.streams import Run
 from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
+
+_LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -92,9 +104,21 @@ def _below(path: Path) -> list[RunSource]:
     if not sources:
         raise DataError(
             f"{path}: no run in this folder or below; a run's folder holds {', '.join(RUN_FILES)}, "
-            f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own"
+            f"and {', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} are runs on their own{_lying_in(root)}"
         )
     return sources
+
+
+def _lying_in(root: Path) -> str:
+    """What lies in a folder without a run, and what can be done with it where that is known."""
+    walked = islice(os.walk(root), _LISTED)
+    places = (Path(folder, name).relative_to(root).as_posix() for folder, _, files in walked for name in sorted(files))
+    names = [name for name in places if PurePath(name).name not in (VEHICLE_FILE, BAG_FILE)]
+    if not names:
+        return ""
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    advice = [text for ending, text in NO_LOGS.items() if any(name.lower().endswith(ending) for name in names)]
+    return "; ".join([f"; found {', '.join(names[:_LISTED])}{more}", *advice])
 
 
 def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
@@ -149,7 +173,7 @@ def _root(path: Path) -> Path:
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir():
         return path
-    if path.name in (*RUN_FILES, VEHICLE_FILE) or message_format(path) is not None:
+    if path.name.lower() in (*RUN_FILES, VEHICLE_FILE) or message_format(path) is not None:
         return path.parent
     raise DataError(
         f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
@@ -174,7 +198,7 @@ def _run_places(root: Path) -> Iterator[Path]:
         if "calibration.json" in files and ENCODER_FILE not in files:
             continue
         bag = are_of_a_bag(files)
-        if bag or any(name in files for name in RUN_FILES):
+        if bag or run_files_in(files):
             yield Path(folder)
         for name in files:
             suffix = Path(name).suffix.lower()

@@ -19,11 +19,15 @@ import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.column_names import contract_names
 from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
+from sccal.logs.dialect import filled_pairs, in_seconds, spread_bursts, times_of_text, with_points
 from sccal.logs.streams import Notice
+from sccal.logs.text import as_utf8
 from sccal.logs.timeline import order_in_time
 
 _LONG_NUMBER = 64
+_TURN_RAD = 6.3
 
 
 @dataclass(frozen=True)
@@ -59,15 +63,27 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     """
     source = path.name
     data = _load(path)
-    names, separator, header_line, below = split_header(data, path)
+    logged, separator, header_line, below = split_header(data, path)
     body = data[below:]
+    named = contract_names(logged, alternatives)
+    names = named.names
     required = _required(names, alternatives, path, header_line)
     notices: list[Notice] = []
+    if named.taken:
+        shown = ", ".join(f"{theirs} as {ours}" for ours, theirs in named.taken.items())
+        notices.append(
+            Notice(source, f"columns taken by other names: {shown}", len(named.taken), f"line {header_line}")
+        )
     body = _without_endless_lines(body, header_line, source, notices)
     body = _without_cut_line(body, separator, len(names), header_line, source, notices)
+    body = with_points(body, separator, source, notices)
     frame = _parse(body, names, separator, header_line, path, notices)
     columns, content = _numeric_columns(frame, names, required, header_line, source, notices)
     line = np.arange(len(frame), dtype=np.int64) + header_line + 1
+    columns["t"] = in_seconds(columns["t"], named.time_unit_s, source, notices)
+    filled_pairs(columns, required, content, source, line, notices)
+    if named.plain_yaw:
+        _tell_unit_of_yaw(columns, source, notices)
 
     readable = content.copy()
     for name in required:
@@ -85,6 +101,7 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
         )
     columns = {name: column[readable] for name, column in columns.items()}
     line = line[readable]
+    columns["t"] = spread_bursts(columns["t"], [columns[name] for name in required[1:]], line, source, notices)
     order, order_notices = order_in_time(columns["t"], line, source)
     columns = {name: column[order] for name, column in columns.items()}
     return Table(source, columns, line[order], rows_seen, (*notices, *order_notices))
@@ -97,9 +114,7 @@ def _load(path: Path) -> bytes:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
     if is_blank(data):
         raise blank_file(path, len(data))
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise DataError(f"{path}: UTF-16 text; save it as UTF-8")
-    data = data.removeprefix(b"\xef\xbb\xbf")
+    data = as_utf8(data)
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
     return data.replace(b"\0", b"?") if b"\0" in data else data
@@ -234,6 +249,8 @@ def _numeric_columns(
             continue
         values = _floats(series)
         values[~np.isfinite(values)] = np.nan
+        if name == "t" and _is_text(series):
+            values = times_of_text(series, values, source, notices)
         if name not in required:
             lost = filled & np.isnan(values) & ~comment
             if lost.any() and not np.isfinite(values).any():
@@ -255,6 +272,17 @@ def _numeric_columns(
             Notice(source, f"columns named twice, the first taken: {shown}", len(repeated), severity="warning")
         )
     return columns, content & ~comment
+
+
+def _tell_unit_of_yaw(columns: dict[str, Floats], source: str, notices: list[Notice]) -> None:
+    """Name a heading without a unit by its size: beyond a turn in radians it is in degrees. In place."""
+    yaw = columns["yaw_deg"]
+    most = float(np.nanmax(np.abs(yaw))) if np.isfinite(yaw).any() else 0.0
+    if most <= _TURN_RAD:
+        columns["yaw_deg"] = np.degrees(yaw)
+    unit = "radians" if most <= _TURN_RAD else "degrees"
+    what = f"headings without a unit in their name taken as {unit}: they reach {most:.4g}"
+    notices.append(Notice(source, what, int(np.isfinite(yaw).sum()), "", "warning"))
 
 
 def _is_text(series: pd.Series[Any]) -> bool:

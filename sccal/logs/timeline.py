@@ -40,7 +40,7 @@ def order_in_time(t_s: Floats, line: Ints, source: str) -> tuple[Ints, tuple[Not
         order = _without_steps_back(t_s, line, source, notices)
         order = _sorted_swaps(t_s, order, line, source, notices)
     order = _without_leaps(t_s, order, line, source, notices)
-    if order.size < LEAST_SHARE * t_s.size and t_s.size > FEW_ROWS:
+    if order.size < LEAST_SHARE * t_s.size and t_s.size > FEW_ROWS and order.size < LEAST_SHARE * np.unique(t_s).size:
         why = "; ".join(str(notice) for notice in notices)
         raise DataError(f"{source}: {t_s.size - order.size} of {t_s.size} rows are out of order in time: {why}")
     return order, tuple(notices)

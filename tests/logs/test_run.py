@@ -188,3 +188,33 @@ def test_a_measured_run_cut_anywhere_still_reads(tmp_path: Path) -> None:
         run = read_run(discover([tmp_path])[0])
         assert not run.wheels.loose.any()
         assert run.fixes.lat_deg.size > 400
+
+
+def test_capitals_in_the_names_of_files_do_not_matter(tmp_path: Path) -> None:
+    folder = tmp_path / "monday"
+    folder.mkdir()
+    (folder / "Encoder.csv").write_text("t,left_ticks,right_ticks\n0,1,2\n1,2,3\n2,3,4\n")
+    (folder / "AHRS.CSV").write_text("t,yaw_deg\n0,1\n1,2\n2,3\n")
+    (folder / "vehicle.toml").write_text(VEHICLE)
+    (folder / "gps.csv").write_text("t,lat_deg,lon_deg\n0,1,2\n1,1,2\n")
+    source = discover([tmp_path])[0]
+    with pytest.raises(DataError, match=r"lacks gnss\.nmea.*found encoder\.csv, ahrs\.csv; not read: gps\.csv"):
+        read_run(source)
+    (folder / "gps.csv").rename(folder / "GNSS.csv")
+    assert read_run(discover([tmp_path])[0]).wheels.t_s.size == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("flight.bin", "ArduPilot"),
+        ("run.bag.active", "rosbag reindex"),
+        ("a/run_0.mcap.zstd", "zstd -d"),
+        ("imu.csv", ""),
+    ],
+)
+def test_a_folder_without_a_run_says_what_lies_there(tmp_path: Path, name: str, advice: str) -> None:
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_bytes(b"x")
+    with pytest.raises(DataError, match=rf"found {name}.*{advice}"):
+        discover([tmp_path])
