@@ -15,6 +15,7 @@ from sccal.inspect.place import legs, placed_fixes
 from sccal.logs.encoder import encoder_table
 from sccal.logs.folder import RunFolder
 from sccal.logs.names import VEHICLE_FILE
+from sccal.logs.one_clock import on_one_clock
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, Vehicle, WheelStream
@@ -91,6 +92,9 @@ class _FolderReading:
         heading = self._tried("heading", self.folder.heading)
         vehicle = self._tried("vehicle", lambda: read_vehicle(vehicle_of(self.source)))
         wheels, used, track_known = self._wheels(vehicle, fixes, heading)
+        if wheels is not None and heading is not None and fixes is not None:
+            heading, fixes, moved = on_one_clock(wheels, heading, fixes)
+            self.notices += moved
         order = ("vehicle", "wheels", "heading", "fixes")
         return LogStreams(
             source=self.source,

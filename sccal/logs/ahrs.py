@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from sccal.errors import DataError
 from sccal.logs.limits import ANGLE_LIMIT_RAD, SIGMA_LIMIT_RAD, TURN_LIMIT_RAD, TURN_RATE_LIMIT_RADPS
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.table import Table, read_table
+from sccal.logs.yaw_values import TURNS, stands_for_none, turn_of
 
 _YAW = ("yaw_deg", "yaw_rad")
 _FURTHER = {
@@ -45,7 +47,7 @@ def ahrs_table(path: Path) -> Table:
     Raises:
         DataError: unreadable file or missing columns.
     """
-    return _without_impossible_yaws(read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad"))), path)
+    return _of_known_unit(_without_impossible_yaws(read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad"))), path))
 
 
 def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:
@@ -80,6 +82,7 @@ def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:
         roll_rad=further["roll"],
         gyro_z_radps=further["gyro_z"],
         extras=table.extras(AHRS_COLUMNS),
+        clock_steps=table.clock_steps,
     )
     return stream, tuple(notices)
 
@@ -94,6 +97,25 @@ def _without_impossible_yaws(table: Table, path: Path) -> Table:
     if beyond.all():
         raise DataError(f"{path}: {notice}; no row is left")
     return table.keep(~beyond, [notice])
+
+
+def _of_known_unit(table: Table) -> Table:
+    """The table with its yaw in the unit of its name, and without numbers that stand for no yaw; both told."""
+    name = next(name for name in _YAW if name in table.columns)
+    own_turn = 360.0 if name == "yaw_deg" else 2.0 * np.pi
+    none, number = stands_for_none(table.columns[name], own_turn)
+    if none.any():
+        what = f"rows with a {name} of exactly {number:g}, which jumps from there and back, dropped: it stands for none"
+        where = f"line {table.line[none][0]}"
+        table = table.keep(~none, [Notice(table.source, what, int(none.sum()), where, "warning")])
+    turn = turn_of(table.columns[name])
+    if turn is None or turn == own_turn:
+        return table
+    what = f"{name} begins again after {turn:.6g}: read as {TURNS[turn]}"
+    every = np.ones(table.line.size, dtype=np.bool_)
+    table = table.keep(every, [Notice(table.source, what, table.line.size, f"line {table.line[0]}", "warning")])
+    columns = {**table.columns, name: table.columns[name] * (own_turn / turn)}
+    return replace(table, columns=columns)
 
 
 def _radians(columns: dict[str, Floats], in_degrees: str, in_radians: str) -> Floats | None:

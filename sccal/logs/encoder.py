@@ -82,6 +82,7 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         right_rad=repaired.counts[:, 1] * rad_per_count,
         loose=loose,
         extras=kept.extras((*names, TRAVEL_UNKNOWN)),
+        clock_steps=table.clock_steps,
     )
     return stream, tuple(notices)
 

@@ -9,11 +9,13 @@ from typing import NoReturn
 
 from sccal.errors import DataError
 from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag, run_files_in
-from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE, VEHICLE_FILE
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
 
 _FEWEST_ROWS = 2
 _MOST_OTHERS = 8
+_OWN = (VEHICLE_FILE, "truth.json", "convert.json", "degrade.json", "reference.csv")
+"""Files beside a run that are no logs."""
 _ANY_FIXES = f"{NMEA_FILE} (or {GNSS_FILE})"
 
 
@@ -104,7 +106,7 @@ def listed_folder(path: Path) -> RunFolder:
     there = tuple(name for name in regular if regular[name])
     odd = tuple(actual[name] for name in regular if not regular[name])
     spelled = {name: theirs for name, theirs in actual.items() if theirs != name}
-    known = {*actual.values(), *(name for name in names if name.lower().endswith((".toml", ".html", ".json")))}
+    known = {*actual.values(), *_OWN}
     others = tuple(sorted(name for name in names - known if (path / name).is_file() and not name.startswith(".")))
     return RunFolder(path, there, odd, not there and are_of_a_bag(names), spelled, others[:_MOST_OTHERS])
 

@@ -90,6 +90,7 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
         sigma_north_m=sigma_north_m,
         cov_en_m2=np.nan_to_num(table.columns.get("cov_en_m2", np.zeros(n))),
         extras=table.extras(GNSS_COLUMNS),
+        clock_steps=table.clock_steps,
     )
     return stream, table.notices
 

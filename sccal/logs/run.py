@@ -24,6 +24,7 @@ from sccal.logs.formats import (
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
 from sccal.logs.messages.read import read_message_log
 from sccal.logs.names import BAG_FILE, ENCODER_FILE, VEHICLE_FILE, natural_key
+from sccal.logs.one_clock import on_one_clock
 from sccal.logs.options import ReadOptions
 from sccal.logs.reference import read_reference
 from sccal.logs.streams import Run
@@ -137,6 +138,7 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
     wheels, wheel_notices = folder.wheels(vehicle)
     heading, heading_notices = folder.heading()
     fixes, fix_notices = folder.fixes()
+    heading, fixes, clock_notices = on_one_clock(wheels, heading, fixes)
     return Run(
         name=source.name,
         path=source.path,
@@ -144,7 +146,7 @@ def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
         wheels=wheels,
         heading=heading,
         fixes=fixes,
-        notices=(*notices, *wheel_notices, *heading_notices, *fix_notices),
+        notices=(*notices, *wheel_notices, *heading_notices, *fix_notices, *clock_notices),
         reference=read_reference(source.path, fixes),
     )
 

@@ -16,7 +16,7 @@ from sccal.errors import one_line
 from sccal.logs.names import AHRS_FILE
 
 Convention = Literal["enu", "ned"]
-_NO_ARRAYS = ("utc_has_date", "extras")
+_NO_ARRAYS = ("utc_has_date", "extras", "clock_steps")
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,16 @@ class Vehicle:
 
 
 @dataclass(frozen=True)
+class ClockStep:
+    """Where a clock moved by an amount that only the stream itself shows."""
+
+    at_s: float
+    """The first time after it."""
+    size_s: float
+    """By how much the times before were moved."""
+
+
+@dataclass(frozen=True)
 class WheelStream:
     """Cumulative angles of the two wheels, forward positive, counters unwrapped and repaired."""
 
@@ -64,6 +74,8 @@ class WheelStream:
     loose: Bools
     """True where the travel since the previous sample is not known well: a counter reset, or a gap."""
     extras: Mapping[str, Floats] = field(default_factory=dict)
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Steps of its clock whose size only its own rows show (see set_clock)."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +98,8 @@ class HeadingStream:
     """Of yaw_rad; None for the vehicle's (see Vehicle.convention)."""
     source: str = AHRS_FILE
     """Where the readings come from, as the user would name it."""
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Steps of its clock whose size only its own rows show (see set_clock)."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +126,8 @@ class FixStream:
     extras: Mapping[str, Floats] = field(default_factory=dict)
     speed_mps: Floats | None = None
     """The receiver's own speed over ground (unsigned) at the fixes' epochs; NaN where there is none at that epoch."""
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Steps of its clock whose size only its own rows show (see set_clock)."""
 
     def take(self, rows: Ints) -> FixStream:
         """Only the fixes at the indices ``rows``."""

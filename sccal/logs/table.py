@@ -22,7 +22,8 @@ from sccal.errors import DataError
 from sccal.logs.column_names import contract_names
 from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
 from sccal.logs.dialect import filled_pairs, in_seconds, spread_bursts, times_of_text, with_points
-from sccal.logs.streams import Notice
+from sccal.logs.set_clock import carried_on
+from sccal.logs.streams import ClockStep, Notice
 from sccal.logs.text import as_utf8
 from sccal.logs.timeline import order_in_time
 
@@ -41,11 +42,13 @@ class Table:
     rows_seen: int
     """Rows with any content, before rows were dropped."""
     notices: tuple[Notice, ...]
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Steps of its clock whose size only these rows show."""
 
     def keep(self, rows: Bools, notices: Sequence[Notice] = ()) -> Table:
         """The same table with only the rows where ``rows`` (n) is True, and further notices."""
         columns = {name: column[rows] for name, column in self.columns.items()}
-        return Table(self.source, columns, self.line[rows], self.rows_seen, (*self.notices, *notices))
+        return Table(self.source, columns, self.line[rows], self.rows_seen, (*self.notices, *notices), self.clock_steps)
 
     def extras(self, used: Sequence[str]) -> dict[str, Floats]:
         """The columns that are not in ``used``."""
@@ -101,10 +104,11 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
         )
     columns = {name: column[readable] for name, column in columns.items()}
     line = line[readable]
+    columns["t"], steps = carried_on(columns["t"], line, source, notices)
     columns["t"] = spread_bursts(columns["t"], [columns[name] for name in required[1:]], line, source, notices)
     order, order_notices = order_in_time(columns["t"], line, source)
     columns = {name: column[order] for name, column in columns.items()}
-    return Table(source, columns, line[order], rows_seen, (*notices, *order_notices))
+    return Table(source, columns, line[order], rows_seen, (*notices, *order_notices), steps)
 
 
 def _load(path: Path) -> bytes:

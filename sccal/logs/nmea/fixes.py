@@ -50,6 +50,7 @@ def read_fixes(dated: Dated, source: str, notices: list[Notice]) -> FixStream | 
         cov_en_m2=cov_en_m2,
         extras=extras(fixes, positions.kind),
         speed_mps=_speeds(dated, running_s),
+        clock_steps=dated.clock_steps,
     )
 
 

@@ -32,6 +32,7 @@ from sccal.logs.nmea.sentences import Sentences, talker_name
 from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
 from sccal.logs.streams import HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
+from sccal.logs.yaw_values import stands_for_none
 
 _USUAL = (Kind.HDT, Kind.THS, Kind.KSXT, Kind.AVR, Kind.PASHR)
 HEADING_NAMES = ", ".join(LAYOUTS[kind].name for kind in dict.fromkeys((*_USUAL, *READ_FOR_HEADINGS)))
@@ -84,6 +85,12 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
     notices += order_notices
     chosen = timed[order]
     readings = readings.take(chosen)
+    none, number = stands_for_none(readings.yaw_deg, 360.0)
+    if none.any():
+        where = f"line {dated.sentences.line[readings.rows[none][0]]}"
+        what = f"headings of exactly {number:g}, which jump from there and back, dropped: they stand for none"
+        notices.append(Notice(name, what, int(none.sum()), where, "warning"))
+        chosen, readings = chosen[~none], readings.take(~none)
     what = f"headings read, clockwise from {_fields_of(readings.kind).north} north"
     if readings.kind not in (Kind.PASHR, Kind.PSXN) and readings.pitch_deg is not None:
         what += "; their pitch is the inclination of the baseline between the antennas"
@@ -97,6 +104,7 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
         utc_s=None if epoch_s is None else epoch_s[chosen],
         convention="ned",
         source=name,
+        clock_steps=dated.clock_steps,
     )
 
 

@@ -5,6 +5,7 @@ Only sentences whose checksum is right are used, or which have none and are othe
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_SPEEDS
 from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import Sentences, all_lower, find_sentences, kinds_in, names_of
 from sccal.logs.nmea.times import Dated, date_sentences
+from sccal.logs.set_clock import carried_on
 from sccal.logs.streams import FixStream, HeadingStream, Notice
 from sccal.logs.text import as_utf8
 
@@ -104,7 +106,10 @@ def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice
         )
     notices: list[Notice] = []
     found = with_receive_times(found, source, notices)
+    host_t_s, steps = carried_on(found.host_t_s, found.line, source, notices)
+    found = replace(found, host_t_s=host_t_s)
     dated = date_sentences(_whole_sentences(found, source, notices), source, notices)
+    dated = replace(dated, clock_steps=steps)
     return dated, int(found.start.size), notices
 
 
@@ -112,7 +117,8 @@ def _shown(raw: bytes) -> str:
     """The beginning of the first line with anything in it, for messages."""
     lines = raw[:_SHOWN_FROM].split()
     text = lines[0][:_SHOWN].decode("ascii", errors="replace") if lines else ""
-    return "".join(letter if letter.isprintable() else "?" for letter in text) or "blank"
+    shown = "".join(letter if letter.isprintable() else "?" for letter in text) or "blank"
+    return shown + (" (JSON: gpsd's reports are not read, `gpspipe -r` logs its sentences)" if text[:1] == "{" else "")
 
 
 def _whole_sentences(found: Sentences, source: str, notices: list[Notice]) -> Sentences:

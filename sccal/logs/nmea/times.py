@@ -22,7 +22,7 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import Decimals
 from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_DATES, Date, Kind
 from sccal.logs.nmea.sentences import Sentences, kinds_in
-from sccal.logs.streams import Notice
+from sccal.logs.streams import ClockStep, Notice
 
 DAY_S = 86400.0
 ROLLOVER_DAYS = 1024 * 7
@@ -55,6 +55,8 @@ class Dated:
     midnight_s: Floats
     """What to add for Unix time; 0 where there is no date."""
     has_date: bool
+    clock_steps: tuple[ClockStep, ...] = ()
+    """Of the receive times (see set_clock)."""
 
     @property
     def step_s(self) -> float:
