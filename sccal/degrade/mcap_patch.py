@@ -20,7 +20,7 @@ from sccal.logs.messages.json_values import found_ways
 from sccal.logs.messages.layout import MalformedError, Shape
 from sccal.logs.messages.mcap_file import Channel
 from sccal.logs.messages.protobuf import ProtobufWalker, appended
-from sccal.logs.messages.topics import normal_path, walker_of
+from sccal.logs.messages.topics import SPOKEN, normal_path, walker_of
 
 _KEPT = 64
 
@@ -56,7 +56,7 @@ class Patcher:
                 cast = kind.type(value) if kind.kind == "f" else kind.type(round(value))
                 out[place.offset : place.offset + place.width] = np.array(cast, dtype=kind).tobytes()
         if text is not None:
-            path = next(path for path in shape.texts if normal_path(path) == "sentence")
+            path = next(path for path in shape.texts if normal_path(path) in SPOKEN.values())
             place = shape.texts[path]
             if isinstance(walker, ProtobufWalker):
                 more += appended(walker, path, text)
@@ -88,7 +88,7 @@ def _json_patched(data: bytes, numbers: Mapping[str, float], text: bytes | None)
         if way is not None:
             _put(message, way, value)
     if text is not None:
-        way = next((way for path, way in texts.items() if normal_path(path) == "sentence"), None)
+        way = next((way for path, way in texts.items() if normal_path(path) in SPOKEN.values()), None)
         if way is None:
             raise MalformedError("no sentence in it")
         _put(message, way, text.decode("utf-8", "replace"))

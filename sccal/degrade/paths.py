@@ -14,6 +14,7 @@ from sccal.degrade.folder import DegradedRun, degrade_folder
 from sccal.degrade.mcap import degrade_mcap
 from sccal.errors import DataError, Failure, SccalError
 from sccal.logs.formats import MCAP, message_format
+from sccal.logs.messages.parts import parts_after
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.outputs import each_run, require_apart, shared_vehicle_place, vehicle_place
 from sccal.logs.run import RunSource, find_runs
@@ -51,6 +52,11 @@ def _degrade_file(source: RunSource, out: Path, faults: Faults) -> DegradedRun:
     suffix = source.path.suffix
     if message_format(source.path) is not MCAP:
         raise DataError(f"{source.path}: of logs of messages only MCAP is degraded; `sccal convert` makes one of it")
+    if parts := parts_after(source.path):
+        raise DataError(
+            f"{source.path}: one drive in {len(parts) + 1} files, and only single ones are degraded; "
+            "`sccal convert` makes one of them"
+        )
     name = source.name if source.name.endswith(suffix) else source.name + suffix
     place, own = (None, False) if source.vehicle_toml is None else vehicle_place(source, out, out / source.name)
     target = out / source.name / Path(name).name if own else out / name

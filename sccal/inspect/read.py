@@ -14,6 +14,7 @@ from sccal.errors import DataError
 from sccal.inspect.place import legs, placed_fixes
 from sccal.logs.encoder import encoder_table
 from sccal.logs.folder import RunFolder
+from sccal.logs.messages.read import LooseStreams, read_loose_streams
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.one_clock import on_one_clock
 from sccal.logs.options import ReadOptions
@@ -69,13 +70,66 @@ def read_streams(source: RunSource, options: ReadOptions | None = None) -> LogSt
 
 
 def _of_messages(source: RunSource, options: ReadOptions | None) -> LogStreams:
-    """A log of messages is read whole or not at all."""
+    """A log of messages read whole, and where that fails stream by stream."""
     try:
         run = read_run(source, options)
     except DataError as error:
-        return LogStreams(source, None, False, False, None, None, None, "", (Unread("run", str(error)),), ())
+        return _loose_messages(source, options or ReadOptions(), str(error))
     name = source.path.name
     return LogStreams(source, run.vehicle, True, True, run.wheels, run.heading, run.fixes, name, (), run.notices)
+
+
+def _loose_messages(source: RunSource, options: ReadOptions, why: str) -> LogStreams:
+    """Whatever streams a log of messages holds; its wheels by a stand-in where nobody declares the vehicle."""
+    name = source.path.name
+    unread: list[Unread] = []
+    try:
+        vehicle, notices = read_vehicle(vehicle_of(source))
+    except DataError as error:
+        unread.append(Unread("vehicle", str(error)))
+        vehicle, notices = None, ()
+    used = vehicle or Vehicle(source.path.resolve().stem, source.path.parent / VEHICLE_FILE, 1.0, STAND_IN_TRACK_M, 1.0)
+    try:
+        found = read_loose_streams(source.path, used, options)
+    except DataError:
+        return LogStreams(source, None, False, False, None, None, None, "", (Unread("run", why),), ())
+    track_known = vehicle is not None
+    if vehicle is None and found.wheels is not None:
+        sized = _sized_by_the_rest(used, found)
+        if sized is None:
+            unread.append(Unread("wheels", f"{name}: neither {VEHICLE_FILE} nor the fixes say how far a turn goes"))
+            found = replace(found, wheels=None)
+        else:
+            used, track_known = sized
+            found = read_loose_streams(source.path, used, options)
+    unread += [Unread(what, text) for what, text in found.unread.items()]
+    if not unread:
+        unread.append(Unread("run", why))
+    return LogStreams(
+        source=source,
+        vehicle=used if found.wheels is not None or vehicle is not None else None,
+        declared=vehicle is not None,
+        track_known=track_known,
+        wheels=found.wheels,
+        heading=found.heading,
+        fixes=found.fixes,
+        fix_source=name,
+        unread=tuple(unread),
+        notices=(*notices, *found.notices),
+    )
+
+
+def _sized_by_the_rest(made: Vehicle, found: LooseStreams) -> tuple[Vehicle, bool] | None:
+    """A vehicle whose wheels go as far as the fixes and turn as far as the heading, and whether its track is known."""
+    wheels, fixes = found.wheels, found.fixes
+    if wheels is None or fixes is None:
+        return None
+    radius_m = _metres_per_count(wheels.t_s, wheels.left_rad, wheels.right_rad, fixes)
+    if radius_m is None:
+        return None
+    t_s, left, right, heading = wheels.t_s, wheels.left_rad, wheels.right_rad, found.heading
+    track_m = None if heading is None else _track_m(t_s, left, right, heading, radius_m)
+    return replace(made, wheel_radius_m=radius_m, track_m=track_m or STAND_IN_TRACK_M), track_m is not None
 
 
 @dataclass

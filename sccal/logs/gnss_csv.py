@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
+from sccal.logs.place_units import in_ten_millionths, notation_of
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.table import Table, read_table
 
@@ -45,6 +47,7 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
     Raises:
         DataError: no position in range.
     """
+    table = _in_degrees(table)
     lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
     quality = table.columns.get("fix_quality", np.full(lat.size, np.nan))
     beyond: Bools = (np.abs(lat) > 90) | (np.abs(lon) > 360)
@@ -61,6 +64,7 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
     keep = ~(beyond | origin | none)
     if not keep.any():
         why = "; ".join(str(notice) for notice in notices)
+        why += f"; {notation_of(lat[beyond], lon[beyond])}" if beyond.any() else ""
         raise DataError(f"{path}: none of {lat.size} rows holds a usable position: {why}")
     table = table.keep(keep, notices)
     n = table.line.size
@@ -93,6 +97,18 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
         clock_steps=table.clock_steps,
     )
     return stream, table.notices
+
+
+def _in_degrees(table: Table) -> Table:
+    """The table with its places in degrees where they are whole ten-millionths of one."""
+    lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
+    known = (lat != 0) & (lon != 0)
+    if not known.any() or not in_ten_millionths(lat[known], lon[known]):
+        return table
+    what = "rows with places in whole numbers read as ten-millionths of a degree"
+    every = np.ones(lat.size, dtype=np.bool_)
+    table = table.keep(every, [Notice(table.source, what, int(known.sum()), f"line {table.line[0]}", "warning")])
+    return replace(table, columns={**table.columns, "lat_deg": 1e-7 * lat, "lon_deg": 1e-7 * lon})
 
 
 def _positive(table: Table, name: str, instead: Floats) -> Floats:

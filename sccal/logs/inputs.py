@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sccal.errors import DataError
+from sccal.logs.messages.parts import parts_after
 from sccal.logs.reference import MANIFEST_FILE, REFERENCE_FILE, beside
 from sccal.logs.run import RunSource
 
@@ -42,7 +43,7 @@ def input_paths(source: RunSource) -> Iterator[tuple[str, Path]]:
     """Name and path of every file that a run is read from; nothing is opened."""
     run = source.path
     if run.is_file():
-        yield run.name, run
+        yield from ((path.name, path) for path in (run, *parts_after(run)))
     elif source.folder is None:
         yield from ((path.relative_to(run).as_posix(), path) for path in sorted(run.rglob("*")) if path.is_file())
     else:

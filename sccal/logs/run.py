@@ -22,6 +22,7 @@ from sccal.logs.formats import (
     run_files_in,
 )
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
+from sccal.logs.messages.parts import later_parts
 from sccal.logs.messages.read import read_message_log
 from sccal.logs.names import BAG_FILE, ENCODER_FILE, VEHICLE_FILE, natural_key
 from sccal.logs.one_clock import on_one_clock
@@ -202,9 +203,15 @@ def _run_places(root: Path) -> Iterator[Path]:
         bag = are_of_a_bag(files)
         if bag or run_files_in(files):
             yield Path(folder)
+        later = later_parts(Path(folder), files)
         for name in files:
             suffix = Path(name).suffix.lower()
-            if suffix in MESSAGE_SUFFIXES and not name.startswith(".") and not (bag and suffix == ROS2.suffix):
+            if (
+                name not in later
+                and suffix in MESSAGE_SUFFIXES
+                and not name.startswith(".")
+                and not (bag and suffix == ROS2.suffix)
+            ):
                 path = Path(folder) / name
                 if message_format(path) is not MCAP or library_of(path) != RESULT_LIBRARY:
                     yield path

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sccal.arrays import Bools, Floats
@@ -10,7 +12,9 @@ from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.messages.topics import STAMPED, Messages
 from sccal.logs.messages.wheels import of_messages
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
-from sccal.logs.quality import quality_of
+from sccal.logs.nmea.kinds import LAYOUTS
+from sccal.logs.place_units import in_ten_millionths
+from sccal.logs.quality import RTK_FIXED_M, quality_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice
 from sccal.logs.timeline import order_in_time
 
@@ -24,12 +28,14 @@ def fixes_of_positions(messages: Messages, path: str, source: str) -> tuple[FixS
     Raises:
         DataError: no message holds a usable position.
     """
+    scaled: list[Notice] = []
+    messages = _in_degrees(_of_nav_pvt(messages), source, scaled)
     lat, lon = messages.column("latitude"), messages.column("longitude")
     none = messages.column("status") < 0
     unset = ~none & ~(np.isfinite(lat) & np.isfinite(lon))
     beyond = ~none & ~unset & ((np.abs(lat) > 90) | (np.abs(lon) > 360))
     origin = ~none & (lat == 0) & (lon == 0)
-    notices = []
+    notices = scaled
     for rows, what in (
         (none, "messages without a fix (status −1) dropped"),
         (unset, "messages without a position dropped"),
@@ -69,6 +75,44 @@ def fixes_of_positions(messages: Messages, path: str, source: str) -> tuple[FixS
         cov_en_m2=np.where(stated, np.clip(np.nan_to_num(messages.column("cov_en")), -limit, limit), 0.0),
     )
     return stream, of_messages((*notices, *order_notices))
+
+
+def _of_nav_pvt(messages: Messages) -> Messages:
+    """A u-blox NavPVT as a NavSatFix: heights and errors in mm, fix type 2, 3 or 4 with a valid flag, carrier in flags.
+
+    Of its flags, bit 0 says that the fix holds, and bits 6 and 7 are 1 for float and 2 for fixed ambiguities (u-blox
+    ZED-F9P interface description, UBX-NAV-PVT). Its error is a radius; 1/sqrt(2) of it is that of one axis.
+    """
+    if messages.kind != "NavPVT" or "accuracy" not in messages.values:
+        return messages
+    flags = np.nan_to_num(messages.column("flags")).astype(np.int64)
+    kind = messages.column("fix_type")
+    holds = (kind >= 2) & (kind <= 4) & ((flags & 1) == 1)
+    carrier = (flags >> 6) & 3
+    status = np.where(holds, np.where(carrier > 0, 2, np.where(flags & 2, 1, 0)), -1)
+    variance = 0.5 * (1e-3 * messages.column("accuracy")) ** 2
+    least = RTK_FIXED_M * 1.01
+    variance = np.where(carrier == 1, np.maximum(variance, least**2), variance)
+    values = {
+        "latitude": messages.column("latitude"),
+        "longitude": messages.column("longitude"),
+        "altitude": 1e-3 * messages.column("altitude"),
+        "status": status.astype(np.float64),
+        **dict.fromkeys(("cov_ee", "cov_nn"), variance),
+        "cov_type": np.full(status.size, 1.0),
+    }
+    return replace(messages, values=values)
+
+
+def _in_degrees(messages: Messages, source: str, notices: list[Notice]) -> Messages:
+    """Positions in ten-millionths of a degree, as u-blox and MAVLink have them, in degrees."""
+    lat, lon = messages.column("latitude"), messages.column("longitude")
+    known = np.isfinite(lat) & np.isfinite(lon) & (lat != 0)
+    if not known.any() or not in_ten_millionths(lat[known], lon[known]):
+        return messages
+    what = "positions in whole numbers read as ten-millionths of a degree"
+    notices.append(Notice(source, what, int(known.sum()), f"message {messages.number[0]}", "warning"))
+    return replace(messages, values={**messages.values, "latitude": 1e-7 * lat, "longitude": 1e-7 * lon})
 
 
 def lines_of_sentences(messages: Messages, places: int | None = None) -> bytes:
@@ -114,7 +158,11 @@ def heading_of_sentences(
 _POSITIONS = (b"GGA,", b"RMC,", b"GNS,", b"GGK,", b"KSXT,")
 
 
-_HEADINGS = (b"HDT,", b"THS,", b"$PASHR,", b"$PTNL,AVR,", b"KSXT,")
+_HEADINGS = tuple(
+    f"{layout.name},".encode()
+    for layout in LAYOUTS.values()
+    if layout.heading is not None and layout.name != "HEADINGA"
+)
 
 
 def has_headings(messages: Messages) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from sccal.logs.messages.fixes import (
     lines_of_sentences,
 )
 from sccal.logs.messages.heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
+from sccal.logs.messages.parts import parts_after
 from sccal.logs.messages.topics import FIELDS, Messages, Topics
 from sccal.logs.messages.wheels import (
     joint_names,
@@ -40,6 +42,7 @@ from sccal.logs.table import Table
 
 _PATH_OPTIONS = ("left_ticks", "right_ticks", "left_rad", "right_rad", "yaw", "latitude", "longitude")
 _LISTED = 40
+Stream = TypeVar("Stream", WheelStream, HeadingStream, FixStream)
 
 
 @dataclass(frozen=True)
@@ -104,10 +107,52 @@ def read_message_log(
     return wheels, heading, fixes, (*notices, *wheel_notices, *heading_notices, *fix_notices)
 
 
+@dataclass(frozen=True)
+class LooseStreams:
+    """What could be read of a log of messages, stream by stream; None for what could not, with why."""
+
+    wheels: WheelStream | None
+    heading: HeadingStream | None
+    fixes: FixStream | None
+    unread: Mapping[str, str]
+    """Why, by wheels, heading or fixes."""
+    notices: tuple[Notice, ...]
+
+
+def read_loose_streams(path: Path, vehicle: Vehicle, options: ReadOptions) -> LooseStreams:
+    """Each stream of a log of messages on its own, as far as it can be read.
+
+    Raises:
+        DataError: the file cannot be read at all.
+        UsageError: as read_message_log.
+    """
+    log, notices = _opened(path, vehicle, options)
+    told = list(notices)
+    unread: dict[str, str] = {}
+
+    def tried(what: str, read: Callable[[_Log], tuple[Stream, tuple[Notice, ...], tuple[str, ...]]]) -> Stream | None:
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                stream, own, _ = read(log)
+        except DataError as error:
+            unread[what] = str(error)
+            return None
+        told.extend(own)
+        return stream
+
+    wheels, heading, fixes = tried("wheels", _wheels), tried("heading", _heading), tried("fixes", _fixes)
+    return LooseStreams(wheels, heading, fixes, unread, tuple(told))
+
+
 def _opened(path: Path, vehicle: Vehicle, options: ReadOptions) -> tuple[_Log, tuple[Notice, ...]]:
     topics = Topics(_asked_paths(options))
     metadata: dict[str, dict[str, str]] = {}
-    notices = (message_format(path) or ROS2).read(path, topics.open, metadata)
+    form, parts = message_format(path) or ROS2, parts_after(path) if path.is_file() else ()
+    notices = form.read(path, topics.open, metadata)
+    for part in parts:
+        notices += form.read(part, topics.open, metadata)
+    if parts:
+        notices += (Notice(path.name, f"further files of the same drive read, up to {parts[-1].name}", len(parts)),)
     if not topics.seen:
         why = "; ".join(str(notice) for notice in notices) or "it holds no channel"
         raise DataError(f"{path}: no message can be read: {why}")
@@ -259,6 +304,7 @@ def _wheels(log: _Log) -> tuple[WheelStream, tuple[Notice, ...], tuple[str, ...]
         return stream, of_messages(notices), (topic,)
     joints = [m for m in log.found.values() if m.kind == "JointState"]
     ranks = [("JointState", lambda m: joints_of(m, options) is not None), ("Odometry", _always)]
+    ranks.append(("TwistStamped", lambda m: "cmd" not in m.topic.casefold()))
     instead = "--left-ticks TOPIC:path and --right-ticks TOPIC:path"
     if joints and not options.wheels_topic and not any(joints_of(m, options) for m in joints):
         names = "; ".join(f"{m.topic} has {', '.join(joint_names(m)[:20])}" for m in joints)
@@ -269,7 +315,7 @@ def _wheels(log: _Log) -> tuple[WheelStream, tuple[Notice, ...], tuple[str, ...]
         )
     messages, tell = _chosen(log, "wheels", "--wheels-topic", options.wheels_topic, ranks, instead)
     where, source = log.where(messages.topic), log.source(messages.topic)
-    if messages.kind == "Odometry":
+    if messages.kind in ("Odometry", "TwistStamped"):
         stream, notices = wheels_of_odometry(messages, log.vehicle, where, source)
     else:
         names_there = joints_of(messages, options)
@@ -343,6 +389,7 @@ def _fixes(log: _Log) -> tuple[FixStream, tuple[Notice, ...], tuple[str, ...]]:
         ("NavSatFix", positions_in),
         ("GPSFix", positions_in),
         ("LocationFix", positions_in),
+        ("NavPVT", positions_in),
     ]
     instead = "--latitude TOPIC:path and --longitude TOPIC:path"
     messages, tell = _chosen(log, "fixes", "--fix-topic", options.fix_topic, ranks, instead)

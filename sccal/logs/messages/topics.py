@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,7 +35,12 @@ _POSITION = {
 }
 FIELDS: Mapping[str, Mapping[str, str]] = {
     "JointState": {},
-    "Odometry": {"speed_mps": "twist.twist.linear.x", "turn_radps": "twist.twist.angular.z"},
+    "Odometry": {
+        **{"speed_mps": "twist.twist.linear.x", "turn_radps": "twist.twist.angular.z"},
+        **{"pose_x_m": "pose.pose.position.x", "pose_y_m": "pose.pose.position.y"},
+        **{f"pose_q{axis}": f"pose.pose.orientation.{axis}" for axis in "xyzw"},
+    },
+    "TwistStamped": {"speed_mps": "twist.linear.x", "turn_radps": "twist.angular.z"},
     "Imu": {
         "x": "orientation.x",
         "y": "orientation.y",
@@ -55,13 +60,22 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
     "NavSatFix": _POSITION,
     "GPSFix": _POSITION,
     "LocationFix": _POSITION,
+    "NavPVT": {
+        **{"latitude": "lat", "longitude": "lon", "altitude": "height", "accuracy": "h_acc"},
+        **{"fix_type": "fix_type", "flags": "flags"},
+    },
     "Sentence": {},
+    "String": {},
 }
 """The types that hold wheels, heading or fixes, with sccal's name and the path of each field that is read."""
 
 _STAMPS = ("header.stamp", "stamp", "timestamp", "header.timestamp", "time")
 _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos", "nanosecs", "nanoseconds")
+SPOKEN = {"Sentence": "sentence", "String": "data"}
+"""Where types of text hold it."""
+_SENTENCE_IN = re.compile(rb"\$(?:[A-Z]{5}|P[A-Z]{3}|KSXT),")
+_LOOK_AT = 200
 STAMPED = "stamped"
 """Column of sentences: 1 where the message has a stamp of its own."""
 _NO_CAUSE = re.compile(
@@ -205,9 +219,17 @@ class Topics:
             if not own:
                 continue
             messages = _collected(topic, kinds[0], own, f"{source} {topic}", time, notices, log_ahead_ns)
-            if messages.t_s.size:
+            if messages.kind == "String":
+                messages = replace(messages, kind="Sentence" if _holds_sentences(messages.texts) else "")
+            if messages.t_s.size and (messages.kind == kinds[0] or messages.kind == "Sentence"):
                 found[topic] = messages
         return found, notices
+
+
+def _holds_sentences(texts: Sequence[bytes]) -> bool:
+    """Whether most of some texts are NMEA, and not what else is published as text."""
+    looked = texts[:_LOOK_AT]
+    return sum(_SENTENCE_IN.search(text) is not None for text in looked) > 0.5 * len(looked)
 
 
 def _may_be_cause(type_name: str) -> bool:
@@ -262,7 +284,7 @@ def _picker(kind: str, asked: Sequence[str]) -> Callable[[Iterable[str], Mapping
             further = [path for path in by_name.values() if path not in taken and _is_cause(path)]
             if len(further) <= _MOST_CAUSES:
                 columns |= {f"+{path}": path for path in further}
-        text = next((path for path in texts if normal_path(path) == "sentence"), "") if kind == "Sentence" else ""
+        text = next((path for path in texts if normal_path(path) == SPOKEN[kind]), "") if kind in SPOKEN else ""
         return Picked(columns, pinned, text, _stamp(by_name))
 
     return pick
@@ -297,7 +319,7 @@ def _collected(
     names = {name for sink in sinks for part in sink.gatherer.parts for name in part.columns}
     values = {name: np.full(count, np.nan) for name in sorted(names)}
     stamp_ns = np.zeros(count, dtype=np.int64)
-    texts: list[bytes] = [b""] * count if kind == "Sentence" else []
+    texts: list[bytes] = [b""] * count if kind in SPOKEN else []
     readable = np.zeros(count, dtype=np.bool_)
     first = 0
     for sink in sinks:
@@ -323,7 +345,7 @@ def _collected(
     if time == "header":
         unset = stamp_ns == 0
         chosen_ns = np.where(unset, np.where(log_ns != 0, log_ns, publish_ns) - log_ahead_ns, stamp_ns)
-        if kind == "Sentence":
+        if kind in SPOKEN:
             values[STAMPED] = np.where(unset, 0.0, 1.0)
         if unset.any() and not unset.all():
             where = f"message {int(np.flatnonzero(unset)[0]) + 1}"

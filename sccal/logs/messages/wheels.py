@@ -103,6 +103,8 @@ def wheels_of_odometry(
 ) -> tuple[WheelStream, tuple[Notice, ...]]:
     """Wheels that would have driven the twist: its speed and turning, with the nominal radius and track."""
     speed, turn = messages.column("speed_mps"), messages.column("turn_radps")
+    if _still(speed) and _still(turn) and not _still(messages.column("pose_x_m")):
+        return _wheels_of_poses(messages, vehicle, path, source)
     half_m = 0.5 * vehicle.track_m
     left = _finite(messages, (speed - half_m * turn) / vehicle.wheel_radius_m)
     right = _finite(messages, (speed + half_m * turn) / vehicle.wheel_radius_m)
@@ -112,6 +114,29 @@ def wheels_of_odometry(
         f"({vehicle.path.name}): radii and track found say how much this odometry is off"
     )
     return stream, (Notice(source, what, messages.t_s.size), *notices)
+
+
+def _wheels_of_poses(
+    messages: Messages, vehicle: Vehicle, path: str, source: str
+) -> tuple[WheelStream, tuple[Notice, ...]]:
+    """Wheels that would have driven the poses of an odometry whose twist is empty: its steps along its heading."""
+    x_m, y_m = messages.column("pose_x_m"), messages.column("pose_y_m")
+    qx, qy, qz, qw = (messages.column(f"pose_q{axis}") for axis in "xyzw")
+    rows = np.flatnonzero(np.isfinite(x_m + y_m + qx + qy + qz + qw) & (qx**2 + qy**2 + qz**2 + qw**2 > 0))
+    yaw = np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy**2 + qz**2))[rows]
+    yaw = np.unwrap(yaw)
+    middle = 0.5 * (yaw[1:] + yaw[:-1])
+    along_m = np.cos(middle) * np.diff(x_m[rows]) + np.sin(middle) * np.diff(y_m[rows])
+    travel_m = np.concatenate(([0.0], np.cumsum(along_m)))
+    half_m = 0.5 * vehicle.track_m * (yaw - yaw[:1])
+    sides = ((travel_m - half_m) / vehicle.wheel_radius_m, (travel_m + half_m) / vehicle.wheel_radius_m)
+    left, right = (_Wheel(messages.t_s[rows], side, messages.number[rows]) for side in sides)
+    stream, notices = _stream(left, right, "rad", False, vehicle, path, source)
+    what = (
+        f"poses of an odometry without twist read as two virtual wheels of radius {vehicle.wheel_radius_m:g} m, "
+        f"{vehicle.track_m:g} m apart ({vehicle.path.name}): radii and track found say how much it is off"
+    )
+    return stream, (Notice(source, what, int(rows.size)), *notices)
 
 
 def with_series(stream: WheelStream, series: Mapping[str, tuple[Floats, Floats]]) -> WheelStream:
