@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sccal.align.path import laid_out
+from sccal.align.scale import increments_correlation
 from sccal.align.signs import slope_through_origin, wheel_turn
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
@@ -27,6 +28,7 @@ CHUNK_S = 60.0
 CLEAR_TURN_RAD = np.radians(4.0)
 ENOUGH_TURN_RAD = np.radians(120.0)
 TOGETHER = 0.6
+INCREMENTS = 0.9
 MOVE_WINDOW_S = 2.0
 CELL_S = 1.0
 PATH_RATE_HZ = 20.0
@@ -87,6 +89,11 @@ def _yaw_against_wheels(aligned: Aligned) -> list[Notice]:
     advice = "one of the streams is shifted in time, or frozen"
     if len(apart) == judged and judged > 1:
         correlation = slope_through_origin(wheels[clear], yaw[clear]).correlation
+        if abs(increments_correlation(aligned, t_s, yaw)) > INCREMENTS:
+            raise DataError(
+                f"{ENCODER_FILE}: the counts themselves go with the turning of {aligned.heading_source}, and not their "
+                "steps: they are increments since the row before, not cumulative; write their running sum"
+            )
         raise DataError(
             f"{aligned.heading_source} and {ENCODER_FILE} do not turn together (correlation {correlation:+.2f} over "
             f"{int(clear.sum())} s of turning): {advice}"

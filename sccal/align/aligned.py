@@ -188,10 +188,12 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
 
     timed &= ~compared.old
     good = timed & usable(fixes.quality)
+    unused = []
     for code in np.unique(fixes.quality[timed & ~good]):
         count = int((fixes.quality[timed & ~good] == code).sum())
         name = QUALITY_NAMES.get(int(code), "unknown")
         notices.append(Notice("gnss", f"fixes of quality {code} ({name}) not used", count))
+        unused.append(f"{count} fixes of quality {code} ({name}) are not used")
     simulated = int((fixes.quality[good] == SIMULATOR_QUALITY).sum())
     if simulated:
         notices.append(Notice("gnss", "fixes say they come from a simulator (quality 8)", simulated, "", "warning"))
@@ -205,7 +207,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         advice = ", and that its positions change" if repeated else ""
         raise DataError(
             f"gnss: {good_index.size} usable fixes{beside} within the wheels' span of {span[1] - span[0]:.1f} s, "
-            f"at least {MIN_MEASUREMENTS} are needed: log longer, or check the receiver's fix quality{advice}"
+            f"at least {MIN_MEASUREMENTS} are needed: {'; '.join([*unused, ''])}log longer, or check the receiver's "
+            f"fix quality{advice}"
         )
 
     seen = _inside(heading.t_s, span, heading.source, notices)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sccal.align.path import laid_out
+from sccal.align.scale import check_scale, unit_of_yaw
 from sccal.arrays import Complexes, Floats
 from sccal.errors import DataError
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, VEHICLE_FILE
@@ -61,6 +62,7 @@ def slope_through_origin(x: Floats, y: Floats) -> Slope:
 def check_signs(aligned: Aligned) -> None:
     """Raise DataError where a sign is certainly wrong; say nothing where the drive cannot tell."""
     _check_that_both_wheels_turn(aligned)
+    check_scale(aligned)
     windows = _fix_windows(aligned)
     if windows is not None:
         _check_wheel_directions(aligned, *windows)
@@ -148,7 +150,15 @@ def _check_turning(aligned: Aligned) -> None:
     if np.abs(wheels).sum() < MIN_TURN_RAD or np.abs(yaw).sum() < MIN_TURN_RAD:
         return
     yaw_on_wheels = slope_through_origin(wheels, yaw)
+    if yaw_on_wheels.clear and (unit := unit_of_yaw(yaw_on_wheels.value)):
+        raise DataError(
+            f"{aligned.heading_source}: the yaw turns {abs(yaw_on_wheels.value):.3g} times as far as the wheels "
+            f"(correlation {yaw_on_wheels.correlation:+.2f} over {yaw_on_wheels.windows} s): its unit is not what its "
+            f"name says, and may be {unit}"
+        )
     if not yaw_on_wheels.opposed:
+        if yaw_on_wheels.clear:
+            _check_mirrored_places(aligned)
         return
 
     convention = aligned.heading_convention or aligned.vehicle.convention
@@ -174,6 +184,17 @@ def _check_turning(aligned: Aligned) -> None:
     if yaw_fits is False and wheels_fit is not False:
         raise DataError(f"{seen}, and the path of the fixes sides with the wheels: {mirrored}")
     raise DataError(f"{seen}, and the fixes do not tell which is right: {mirrored}, or, if that was right, {swapped}")
+
+
+def _check_mirrored_places(aligned: Aligned) -> None:
+    """Raise DataError where yaw and wheels turn one way and the path of the fixes is their mirror image."""
+    if _turns_as_the_fixes_do(aligned, wheel_turn(aligned, aligned.wheel_t_s)) is not False:
+        return
+    if _turns_as_the_fixes_do(aligned, aligned.yaw_at_wheels_rad) is False:
+        raise DataError(
+            "gnss: yaw and wheels turn together, and the path of the fixes is the mirror image of both: latitude and "
+            "longitude are exchanged, or one of them lacks its sign (west and south are negative)"
+        )
 
 
 def _turns_as_the_fixes_do(aligned: Aligned, turn_rad: Floats) -> bool | None:

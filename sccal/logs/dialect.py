@@ -15,9 +15,11 @@ import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import TIME_LIMIT_S
+from sccal.logs.quality_words import qualities_of_words
 from sccal.logs.streams import Notice
 
 _LOOK_BYTES = 8192
+_MOST_WORDS = 40
 _COMMA = re.compile(rb"(?<![\d.,])[-+]?\d*,\d+(?![\d.,])")
 _POINT = re.compile(rb"(?<![\d.,])[-+]?\d*\.\d+(?![\d.,])")
 _QUOTED = re.compile(rb'"([-+]?\d*),(\d+)"')
@@ -100,6 +102,25 @@ def in_seconds(t: Floats, unit_s: float, source: str, notices: list[Notice]) -> 
             notices.append(Notice(source, f"times read as {name} since 1970", known.size, "", "warning"))
             return t * size_s
     return t
+
+
+def qualities_of_text(cells: pd.Series[Any], numbers: Floats, source: str, notices: list[Notice]) -> Floats:
+    """GGA's qualities (n) where a column of them holds words that are known; the numbers as they are otherwise."""
+    text = cells.notna().to_numpy() & np.isnan(numbers)
+    plain = cells.astype(str).str.strip().str.strip('"').str.strip()
+    words = sorted(set(plain[text]))
+    if not 0 < len(words) <= _MOST_WORDS:
+        return numbers
+    meaning = qualities_of_words(words)
+    shown = ", ".join(words[:8])
+    if meaning is None:
+        notices.append(
+            Notice(source, f"fix_quality in words that are not known: {shown}", int(text.sum()), "", "warning")
+        )
+        return numbers
+    read = ", ".join(f"{word} as {'not stated' if code < 0 else code}" for word, code in meaning.items())
+    notices.append(Notice(source, f"fix_quality in words, read in GGA's codes: {read}", int(text.sum())))
+    return np.where(text, plain.map(meaning).astype(np.float64).to_numpy(), numbers)
 
 
 def filled_pairs(

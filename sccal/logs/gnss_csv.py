@@ -11,6 +11,7 @@ from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.place_units import in_ten_millionths, notation_of
+from sccal.logs.quality_words import RTKLIB, mapped, of_novatel
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.table import Table, read_table
 
@@ -47,7 +48,7 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
     Raises:
         DataError: no position in range.
     """
-    table = _in_degrees(table)
+    table = _with_quality(_in_degrees(table))
     lat, lon = table.columns["lat_deg"], table.columns["lon_deg"]
     quality = table.columns.get("fix_quality", np.full(lat.size, np.nan))
     beyond: Bools = (np.abs(lat) > 90) | (np.abs(lon) > 360)
@@ -97,6 +98,26 @@ def fixes_of_table(table: Table, path: str) -> tuple[FixStream, tuple[Notice, ..
         clock_steps=table.clock_steps,
     )
     return stream, table.notices
+
+
+def _with_quality(table: Table) -> Table:
+    """The table with GGA's qualities where it has a maker's numbers that cannot be taken for GGA's."""
+    codes, told = table.columns.get("fix_quality"), ""
+    if codes is None:
+        column = next((name for name in ("Q", "q") if name in table.columns), None)
+        if column is None:
+            return table
+        codes, told = mapped(table.columns[column], RTKLIB), f"column {column} read as RTKLIB's quality codes"
+    elif (novatel := of_novatel(codes)) is not None:
+        codes, told = (
+            novatel,
+            "fix_quality read as NovAtel's position types, for its numbers are no quality codes of GGA",
+        )
+    if not told:
+        return table
+    every = np.ones(table.line.size, dtype=np.bool_)
+    table = table.keep(every, [Notice(table.source, told, table.line.size, f"line {table.line[0]}", "warning")])
+    return replace(table, columns={**table.columns, "fix_quality": codes})
 
 
 def _in_degrees(table: Table) -> Table:

@@ -21,7 +21,7 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.column_names import contract_names
 from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
-from sccal.logs.dialect import filled_pairs, in_seconds, spread_bursts, times_of_text, with_points
+from sccal.logs.dialect import filled_pairs, in_seconds, qualities_of_text, spread_bursts, times_of_text, with_points
 from sccal.logs.set_clock import carried_on
 from sccal.logs.streams import ClockStep, Notice
 from sccal.logs.text import as_utf8
@@ -255,6 +255,8 @@ def _numeric_columns(
         values[~np.isfinite(values)] = np.nan
         if name == "t" and _is_text(series):
             values = times_of_text(series, values, source, notices)
+        if name == "fix_quality" and _is_text(series):
+            values = qualities_of_text(series, values, source, notices)
         if name not in required:
             lost = filled & np.isnan(values) & ~comment
             if lost.any() and not np.isfinite(values).any():

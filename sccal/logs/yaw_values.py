@@ -50,7 +50,8 @@ def turn_of(values: Floats) -> float | None:
     falls = falls[(falls > 0) & (falls < steps.size - 1)]
     if span == 0.0 or falls.size == 0:
         return None
-    sizes = np.abs(steps[falls] - 0.5 * (steps[falls - 1] + steps[falls + 1]))
+    beside = np.where(np.abs(steps) > _MOST_OF_RANGE * span, 0.0, steps)
+    sizes = np.abs(steps[falls] - 0.5 * (beside[falls - 1] + beside[falls + 1]))
     usual = float(np.median(sizes))
     turn = min(TURNS, key=lambda size: abs(math.log(usual / size)) if usual > 0 else math.inf)
     alike = np.abs(sizes - usual) < 2.0 * _WITHIN * usual

@@ -21,6 +21,11 @@ def test_a_full_turn_tells_the_unit(turn: float, low: float) -> None:
     assert turn_of((part - low) % 1.0 * turn + low * turn) == turn
 
 
+def test_noise_about_the_end_of_a_turn_hides_no_unit() -> None:
+    part = (np.sin(0.3 * T_S) + 0.003 * np.random.default_rng(2).standard_normal(T_S.size)) % 1.0
+    assert turn_of(part * 2000.0 * np.pi) == 2000.0 * np.pi
+
+
 def test_without_a_full_turn_nothing_is_told() -> None:
     assert turn_of(np.linspace(10.0, 300.0, 500)) is None
     assert turn_of(np.where(T_S < 30.0, 10.0, 300.0)) is None
