@@ -20,6 +20,7 @@ from sccal.logs.streams import Notice
 
 _LOOK_BYTES = 8192
 _MOST_WORDS = 40
+_SAMPLE_ROWS = 1000
 _COMMA = re.compile(rb"(?<![\d.,])[-+]?\d*,\d+(?![\d.,])")
 _POINT = re.compile(rb"(?<![\d.,])[-+]?\d*\.\d+(?![\d.,])")
 _QUOTED = re.compile(rb'"([-+]?\d*),(\d+)"')
@@ -92,14 +93,15 @@ def _dates(text: pd.Series[Any], first: str) -> Floats:
 
 def in_seconds(t: Floats, unit_s: float, source: str, notices: list[Notice]) -> Floats:
     """Times (n) in seconds, of the unit that the column's name says, or that their size leaves no doubt of."""
-    known = np.abs(t[np.isfinite(t)])
     if unit_s != 1.0:
-        notices.append(Notice(source, f"times read in units of {unit_s:g} s, as their column is named", known.size))
+        notices.append(Notice(source, f"times read in units of {unit_s:g} s, as their column is named", t.size))
         return t * unit_s
+    some = t[:: max(1, t.size // _SAMPLE_ROWS)]
+    known = np.abs(some[np.isfinite(some)])
     usual = float(np.median(known)) if known.size else 0.0
     for least, size_s, name in _UNITS:
         if usual >= least:
-            notices.append(Notice(source, f"times read as {name} since 1970", known.size, "", "warning"))
+            notices.append(Notice(source, f"times read as {name} since 1970", t.size, "", "warning"))
             return t * size_s
     return t
 

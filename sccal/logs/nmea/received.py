@@ -24,6 +24,8 @@ from sccal.logs.streams import Notice
 ZONE_STEP_S = 900.0
 """Zones of the world are whole quarters of an hour from UTC."""
 _SAMPLE = 200
+_LOOKED_AT = 600
+"""Sentences from which it is told whether there is anything to read at all."""
 _MOST_BEFORE = 400
 """Bytes before a sentence in which its time is looked for."""
 _MOST_AFTER = 80
@@ -58,14 +60,18 @@ def with_receive_times(found: Sentences, source: str, notices: list[Notice]) -> 
     """The same sentences with receive times in whatever form they stand; told where it is not plain seconds."""
     if found.start.size == 0:
         return found
-    utc_s, dated = _epochs(found)
+    begin = found.take(np.arange(min(found.start.size, _LOOKED_AT)))
     if np.isfinite(found.host_t_s).mean() > _LEAST_SHARE:
-        return _in_seconds(found, utc_s, source, notices)
+        return _in_seconds(found, begin, source, notices)
     first = np.flatnonzero(np.diff(found.line, prepend=0) > 0)
+    looked = int(found.start[first[min(first.size, _LOOKED_AT) - 1]]) + _MOST_BEFORE
+    if _texts_beside(begin, found.data[:looked].tobytes(), first[first < begin.start.size]) is None:
+        return found
     raw = found.data.tobytes()
     texts = _texts_beside(found, raw, first)
     if texts is None:
         return found
+    utc_s, dated = _epochs(found)
     form, unit_s = _form_of(texts, utc_s[first])
     if form is None:
         return found
@@ -102,9 +108,9 @@ def _epochs(found: Sentences) -> tuple[Floats, bool]:
     return np.where(latest >= 0, utc_s[np.maximum(latest, 0)], np.nan), dated.has_date
 
 
-def _in_seconds(found: Sentences, utc_s: Floats, source: str, notices: list[Notice]) -> Sentences:
-    """Plain numbers that are seconds, or go by another unit than the epochs say."""
-    unit_s = _unit_of(found.host_t_s, utc_s)
+def _in_seconds(found: Sentences, begin: Sentences, source: str, notices: list[Notice]) -> Sentences:
+    """Plain numbers that are seconds, or go by another unit than the epochs of the first sentences say."""
+    unit_s = _unit_of(begin.host_t_s, _epochs(begin)[0])
     if unit_s is None or unit_s == 1.0:
         return found
     what = f"receive times read as {_unit_name(unit_s)}: they count {1.0 / unit_s:,.0f} in a second of the receiver"

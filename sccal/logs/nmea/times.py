@@ -119,7 +119,8 @@ def epochs_of_untimed(dated: Dated, rows: Ints) -> Floats:
 def times_of_day(sentences: Sentences, kinds: Iterable[Kind]) -> Floats:
     """(n) seconds since midnight by sentences of some kinds; NaN where no time is stated or the field is none."""
     tod_s = np.full(sentences.start.size, np.nan)
-    kinds = [kind for kind in kinds if LAYOUTS[kind].time is not None]
+    there = np.bincount(sentences.kind, minlength=256)
+    kinds = [kind for kind in kinds if there[kind] and LAYOUTS[kind].time is not None]
     for field, clock in {(LAYOUTS[kind].time, LAYOUTS[kind].clock) for kind in kinds}:
         assert field is not None
         alike = [kind for kind in kinds if (LAYOUTS[kind].time, LAYOUTS[kind].clock) == (field, clock)]
