@@ -19,9 +19,10 @@ import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
+from sccal.logs.bursts import spread_bursts
 from sccal.logs.column_names import contract_names
 from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
-from sccal.logs.dialect import filled_pairs, in_seconds, qualities_of_text, spread_bursts, times_of_text, with_points
+from sccal.logs.dialect import filled_pairs, in_seconds, qualities_of_text, times_of_text, with_points
 from sccal.logs.set_clock import carried_on
 from sccal.logs.streams import ClockStep, Notice
 from sccal.logs.text import as_utf8

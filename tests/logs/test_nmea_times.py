@@ -201,3 +201,23 @@ def test_a_speed_without_time_belongs_to_its_burst(place: int) -> None:
         lines += burst(i, parts)
     stream, _ = read([*burst(-1, [zda(NOON_S)]), *lines])
     np.testing.assert_allclose(stream.speed_mps, 0.01 * np.arange(50), atol=3e-4)
+
+
+def _whole(t: float, lat_deg: float) -> str:
+    """A GGA whose epoch has lost its fraction."""
+    return gga(float(np.floor(t)), lat_deg, 5.3, 40.0, 4, 12, 0.6, 0.8)
+
+
+def test_epochs_that_lost_their_fractions_get_them_back() -> None:
+    t = NOON_S + 0.2 * np.arange(2, 60)
+    lines = [f"{one + 0.03:.3f} {_whole(one, 52.0 + 1e-6 * k)}" for k, one in enumerate(t.tolist())]
+    fixes, notices = parse_nmea("\n".join([*lines, ""]).encode(), "gnss.nmea")
+    assert fixes.host_t_s - fixes.utc_s == pytest.approx(np.full(t.size, fixes.host_t_s[0] - fixes.utc_s[0]), abs=1e-3)
+    assert any("lost their fraction" in notice.what for notice in notices)
+
+
+def test_lines_that_are_written_again_get_no_fractions() -> None:
+    t = NOON_S + 0.2 * np.arange(60)
+    lines = [f"{one + 0.03:.3f} {_whole(one, 52.0 + 1e-6 * (k // 5))}" for k, one in enumerate(t.tolist())]
+    fixes, _ = parse_nmea("\n".join([*lines, ""]).encode(), "gnss.nmea")
+    assert (fixes.utc_s == np.floor(fixes.utc_s)).all()

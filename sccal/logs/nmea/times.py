@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.logs.bursts import spread_bursts
 from sccal.logs.decimals import Decimals
-from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_DATES, Date, Kind
+from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_DATES, READ_FOR_POSITIONS, Date, Kind
 from sccal.logs.nmea.sentences import Sentences, kinds_in
 from sccal.logs.streams import ClockStep, Notice
 
@@ -38,6 +39,7 @@ _LARGEST_STEP_S = 20
 _WHOLE_WITHIN_S = 0.2
 _LEAST_STEP_S = 0.75
 _FEWEST_ROWS = 5
+_FEWEST_IN_SECONDS = 3
 _SIDE_ROWS = 200
 _MOST_STEPS = 20
 _STAMPED = [kind for kind, layout in LAYOUTS.items() if layout.date is not None and layout.date.form == "stamp"]
@@ -73,10 +75,30 @@ def date_sentences(sentences: Sentences, source: str, notices: list[Notice]) -> 
     running_s = np.full(tod_s.size, np.nan)
     running_s[timed] = unwrapped(tod_s[timed])
     _mend_steps(sentences, running_s, timed, source, notices)
+    _give_fractions(sentences, running_s, source, notices)
     midnight_s, has_date = _midnights(sentences, tod_s, running_s, timed, source, notices)
     if has_date:
         midnight_s += _rollover_s(sentences, running_s + midnight_s, source, notices)
     return Dated(sentences, running_s, midnight_s, has_date)
+
+
+def _give_fractions(sentences: Sentences, running_s: Floats, source: str, notices: list[Notice]) -> None:
+    """Spread the epochs of several fixes in one second whose times have lost their fractions; in place.
+
+    Two receivers that give one fix a second each look alike, so it takes three in a second, of one talker.
+    """
+    for kind in READ_FOR_POSITIONS:
+        rows = np.flatnonzero((sentences.kind == kind) & np.isfinite(running_s))
+        t_s = running_s[rows]
+        if rows.size < _FEWEST_IN_SECONDS * _FEWEST_ROWS or not (t_s == np.floor(t_s)).all():
+            continue
+        _, sizes = np.unique(t_s, return_counts=True)
+        if np.median(sizes) < _FEWEST_IN_SECONDS or np.unique(sentences.talker[rows]).size > 1:
+            continue
+        own, position = sentences.take(rows), LAYOUTS[kind].position
+        assert position is not None
+        places = [own.number(field) for field in (position.latitude, position.longitude)]
+        running_s[rows] = spread_bursts(t_s, places, own.line, source, notices)
 
 
 def epoch_key(running_s: Floats) -> Ints:
