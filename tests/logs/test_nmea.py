@@ -318,3 +318,11 @@ def test_some_receive_times_missing_are_told(tmp_path: Path) -> None:
     stream, notices = read(tmp_path, [date(0), "1.0 " + fix(0), fix(1), "1.2 " + fix(2)])
     assert np.isnan(stream.host_t_s[1])
     assert found(notices, "without a receive time").count == 1
+
+
+def test_long_messages_alone_are_named(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="#BESTPOSA, a long message"):
+        read(
+            tmp_path,
+            b"1717243200.5 #BESTPOSA,COM1,0,72.0,FINESTEERING,2316,561618.000;SOL_COMPUTED,NARROW_INT*00000000\n",
+        )

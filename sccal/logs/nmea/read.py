@@ -5,6 +5,7 @@ Only sentences whose checksum is right are used, or which have none and are othe
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from sccal.logs.text import as_utf8
 
 _MOST_NAMES = 12
 _SHOWN_FROM, _SHOWN = 4096, 60
+_LONG_MESSAGE = re.compile(rb"#[A-Z][A-Z0-9]{3,}")
 _RARE = 0.2
 """Sentences without checksum that are shorter than usual are cut where they are no larger a share of their kind."""
 
@@ -115,6 +117,9 @@ def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice
 
 def _shown(raw: bytes) -> str:
     """The beginning of the first line with anything in it, for messages."""
+    named = _LONG_MESSAGE.search(raw[:_SHOWN_FROM])
+    if named is not None:
+        return f"{named[0].decode()}, a long message that is not read for positions; log GGA or KSXT beside it"
     lines = raw[:_SHOWN_FROM].split()
     text = lines[0][:_SHOWN].decode("ascii", errors="replace") if lines else ""
     shown = "".join(letter if letter.isprintable() else "?" for letter in text) or "blank"
