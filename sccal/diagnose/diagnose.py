@@ -81,6 +81,7 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
     if loop.model.fit.misfit > CONTRADICTED:
         loop = _more_trusted(loop, runs, options)
     placebo = _chance(loop, dressed, nonsense)
+    left = unexplained(loop)
     need_more(loop, placebo.highest_nats)
     before = judge(loop.first, options.outage_window_s)
     told = _steps(loop, before, options.outage_window_s)
@@ -101,7 +102,7 @@ def diagnose(runs: Sequence[Aligned], options: CalibrationOptions) -> Diagnosis:
         before=_judgement(before),
         after=_judgement(after),
         held_out_how=how(loop.model),
-        unexplained=unexplained(loop),
+        unexplained=left,
         placebo=placebo,
         parameters_before=_parameters(loop.first, runs),
         parameters_after=parameters,

@@ -107,7 +107,7 @@ def run_loop(
     if trust is Trust.PATH and len(runs) >= WHOLE_RUNS:
         candidates = replace(candidates, free=tuple(one for one in candidates.free if _of_vehicle(one)))
     competing = best_forms(first, candidates, ())
-    saturated = saturate(first, competing, _prices(competing), Reach.ROUGH)
+    saturated = saturate(first, competing, prices(competing), Reach.ROUGH)
     loop = Loop(first, first, candidates, saturated)
     kept: list[Accepted] = []
     tried: list[tuple[Model, Saturated]] = []
@@ -127,7 +127,7 @@ def run_loop(
         competing = list({one.key: one for one in competing}.values())
         # The noise beside all candidates changes with a moment that is new among them, and hardly with anything else.
         reach = Reach.LOOK if moments or count == 0 else None
-        loop.saturated = saturate(loop.model, competing, _prices(competing), reach, _noises(loop.saturated))
+        loop.saturated = saturate(loop.model, competing, prices(competing), reach, _noises(loop.saturated))
     else:
         tried.append((_refitted(loop, _chosen(loop, competing)), loop.saturated))
     # Where it comes to no rest, what was likeliest on the way.
@@ -139,14 +139,14 @@ def run_loop(
 
 def _score(model: Model, counted: float) -> float:
     """Logarithm of a model's evidence, its nats counting by so much, and its prices paid."""
-    return -counted * model.nll - sum(_prices(model.accepted).values())
+    return -counted * model.nll - sum(prices(model.accepted).values())
 
 
 def _of_vehicle(free: Free) -> bool:
     return all(one.scope == "vehicle" for one in free.parameters)
 
 
-def _prices(competing: Sequence[Accepted]) -> dict[str, float]:
+def prices(competing: Sequence[Accepted]) -> dict[str, float]:
     """What each costs: its prior odds, and for what was searched for the places where it was looked for."""
     return {one.key: SEARCH_NATS if one.run is not None else PRICE_NATS for one in competing}
 
@@ -209,6 +209,12 @@ def _moments(loop: Loop) -> list[Found]:
     return []
 
 
+def leave_out(loop: Loop, keys: Sequence[str]) -> None:
+    """The model without some effects, and without what does not hold any more without them."""
+    loop.model = refitted(loop.model, [one for one in loop.model.accepted if one.key not in keys], reach=Reach.LOOK)
+    _take_back(loop)
+
+
 def _take_back(loop: Loop) -> None:
     """Leave what does not hold once it is fitted; what is too small or too unsure to be told may stay where it helps.
 
@@ -244,7 +250,7 @@ def refine_again(loop: Loop) -> None:
         new = {one.free.effect.name: one for one in better if one.run is None}
         before = loop.saturated.model.accepted
         rivals = [one if one.run is not None else new.get(one.free.effect.name, one) for one in before]
-        loop.saturated = saturate(model, rivals, _prices(rivals), None, _noises(loop.saturated))
+        loop.saturated = saturate(model, rivals, prices(rivals), None, _noises(loop.saturated))
 
 
 def need_more(loop: Loop, needed_nats: float) -> None:
@@ -272,7 +278,7 @@ def _why(one: Sized) -> str:
 
 def sized_of(model: Model) -> list[Sized]:
     """What every effect of a model brings and how large it is."""
-    posterior = posterior_of(model, _prices(model.accepted))
+    posterior = posterior_of(model, prices(model.accepted))
     keys = [one.key for one in model.accepted]
     found = []
     for one in model.accepted:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.diagnose.criteria import PATTERN_NATS
-from sccal.diagnose.loop import Loop
+from sccal.diagnose.criteria import LEAST_NATS, PATTERN_NATS
+from sccal.diagnose.loop import Loop, leave_out, prices
 from sccal.effects.patterns import PATTERNS, Pattern
-from sccal.evidence.extension import Free
+from sccal.evidence.extension import Free, name_in
 from sccal.evidence.model import Accepted, Model, refitted
 from sccal.evidence.posterior import PRICE_NATS
 from sccal.evidence.saturated import posterior_of, saturate
@@ -26,7 +26,24 @@ MOST_TRIED = 4
 
 
 def unexplained(loop: Loop) -> Unexplained:
-    """The strongest pattern beside the final model, where it is strong enough to be told."""
+    """The strongest pattern beside the final model, where it is strong enough to be told.
+
+    What the model holds and what brings nothing beside that pattern has only made up for it, and is taken back: a
+    third harmonic of the heading, which no effect is, looks a little like readings that are early and smoothed.
+    """
+    found, stand_ins = _strongest(loop)
+    if not stand_ins:
+        return found
+    for key in stand_ins:
+        loop.taken_back[name_in(key)] = (
+            f"it makes up for what follows {found.depends_on}, and beside that brings nothing"
+        )
+    leave_out(loop, stand_ins)
+    return _strongest(loop)[0]
+
+
+def _strongest(loop: Loop) -> tuple[Unexplained, list[str]]:
+    """The pattern, and the effects of the model that do not hold beside it."""
     kept = list(loop.model.accepted)
     patterns = {pattern.name: Accepted(Free(pattern)) for pattern in PATTERNS}
     full = saturate(loop.model, [*kept, *patterns.values()], dict.fromkeys(patterns, PRICE_NATS), Reach.LOOK)
@@ -37,8 +54,10 @@ def unexplained(loop: Loop) -> Unexplained:
         # Among all the others a pattern may have run away from where it is linear: what counts is what it is alone.
         model = refitted(loop.model, [*kept, patterns[name]], reach=Reach.LOOK)
         if found := _told(model, patterns[name], keys):
-            return found
-    return Unexplained(False)
+            beside = posterior_of(model, {**prices(kept), name: PRICE_NATS})
+            needed = {one.accepted.key: LEAST_NATS if one.told else 0.0 for one in loop.sized}
+            return found, [key for key in keys if beside.worth(key, [*keys, name]) < needed[key]]
+    return Unexplained(False), []
 
 
 def _told(model: Model, accepted: Accepted, kept: list[str]) -> Unexplained | None:

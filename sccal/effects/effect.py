@@ -96,6 +96,8 @@ class Effect(ABC):
     """The quantity that its residual follows, to draw it against."""
     search: Search = "none"
     """How its shapes are found: a size on a grid and refined, a moment of the run, a place; none where it has none."""
+    beside: str = ""
+    """An effect that is free wherever this one is: what the alignment has put right of this one, it takes back."""
     undone_for: Stream | None = None
     """The stream whose stamps the alignment moves where this effect is large: it is then found before the fit."""
     suspect_stream: Stream = "motion"

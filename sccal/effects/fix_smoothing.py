@@ -46,6 +46,7 @@ class FixSmoothing(Effect):
     excited_by = "turn at two turn rates, and drive straights at two speeds"
     reference = "a first-order filter; Kaplan and Hegarty 2017, Understanding GPS/GNSS, on smoothing in receivers"
     shown_against = "turn_rate"
+    beside = "gnss_latency"
 
     def says(self, found: Mapping[str, Measured]) -> str:
         return f"the receiver smooths its positions over {size(found['s'])} s"

@@ -39,6 +39,7 @@ class HeadingSmoothing(Effect):
     reference = "Mahony et al. 2008, Nonlinear complementary filters on the special orthogonal group"
     bends_heading = True
     shown_against = "turn_rate"
+    beside = "heading_latency"
 
     def says(self, found: Mapping[str, Measured]) -> str:
         return f"the AHRS smooths its headings over {size(found['s'])} s"

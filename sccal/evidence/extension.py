@@ -20,7 +20,7 @@ from sccal.filter.columns import MOTION_PORTS, HeadingBend, Placed, kernel_colum
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import Columns
 
-SMALL_RAD = 1e-3
+SMALL_RAD, SMALL_S = 1e-3, 1e-3
 SMALL_SHARE = 1e-3
 """Steps of the derivatives by the heading, and by a parameter as a share of its prior."""
 MIN_PATH = 10
@@ -134,7 +134,9 @@ class FreeEffects:
 
         Raises UsageError for unknown ones, and for those that need a search; DataError where the log lacks the column.
         """
-        effects = tuple(_as_named(effect_by_name(name, aligned)) for name in dict.fromkeys(names))
+        asked = [effect_by_name(name, aligned) for name in names]
+        beside = [effect_by_name(effect.beside, aligned) for effect in asked if effect.beside]
+        effects = tuple(_as_named(effect) for effect in {one.name: one for one in (*asked, *beside)}.values())
         return cls(effects) if effects else None
 
     @property
@@ -168,7 +170,8 @@ class FreeEffects:
         """
         seen = self._delayed(view, values)
         found = Laid(seen, _turned_rad(seen))
-        if known is not None and found.turned_rad is known.turned_rad is None:
+        same_age = known is not None and seen.heading_delay_s == known.view.heading_delay_s
+        if known is not None and same_age and found.turned_rad is known.turned_rad is None:
             found = known
         new = self._spans[found.count :]
         stage_of = [STAGES.index(effect.stage) for effect, _ in self.parameters]
@@ -179,7 +182,31 @@ class FreeEffects:
                 found = replace(found, view=_after(seen, before, values))
             for free, first, last in here:
                 found = found.and_one(free, values[first:last], first)
-        return replace(found, view=seen)
+        return replace(self._with_older(found, values), view=seen)
+
+    def _with_older(self, found: Laid, values: Floats) -> Laid:
+        """The derivative by the readings' age, with what the other effects do there: they too are shown as they were.
+
+        Without it a fit of a latency beside a smoothing crawls: each round leaves half of the way.
+        """
+        late = [first for free, first, _ in self._spans if free.effect.undone_for == "headings"]
+        if not late or not any(one.effect.bends_heading for one, first, _ in self._spans if first != late[0]):
+            return found
+        older = replace(found.view, heading_delay_s=found.view.heading_delay_s + SMALL_S)
+        slope = np.zeros(found.view.headings.t_s.size)
+        for free, first, last in self._spans:
+            if first != late[0] and free.effect.bends_heading and values[first:last].any():
+                more = free.turns(older, values[first:last]) - free.turns(found.view, values[first:last])
+                slope = slope + more / SMALL_S
+        if not slope.any():
+            return found
+        placed = tuple(
+            replace(one, column=replace(one.column, values=one.column.values + slope))
+            if one.parameter == late[0] and isinstance(one.column, Column)
+            else one
+            for one in found.placed
+        )
+        return replace(found, placed=placed, known_rad=found.known_rad - values[late[0]] * slope)
 
     @cached_property
     def _spans(self) -> tuple[tuple[Free, int, int], ...]:
