@@ -23,7 +23,7 @@ from sccal.evidence.extension import Free, plain_forms
 from sccal.evidence.joint import at_least
 from sccal.evidence.model import Accepted, Model, model_of, refitted
 from sccal.evidence.posterior import PRICE_NATS
-from sccal.evidence.saturated import saturate
+from sccal.evidence.saturated import posterior_of, saturate
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import OFFSET
 from sccal.filter.noise import Reach
@@ -72,11 +72,20 @@ def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float
         if key in kept
     ]
     strong = [one for one in found if one.evidence_nats >= STRONG_NATS and one.size >= 1.0]
+    whole = full.model
+    while strong:
+        # Among fifty others two that make up for each other may look strong; fitted without the others they have to be.
+        names = {one.effect for one in strong}
+        chosen = [*model.accepted, *(one for one in candidates if one.free.effect.name in names)]
+        whole = refitted(full.model, chosen, full.given([one.key for one in chosen]), Reach.LOOK)
+        alone = posterior_of(whole, {one.key: PRICE_NATS for one in chosen})
+        worths = {one.free.effect.name: alone.worth(one.key, list(alone.rows)) for one in chosen}
+        held = [one for one in strong if worths[one.effect] >= STRONG_NATS]
+        if len(held) == len(strong):
+            break
+        strong = held
     if not strong:
         return Lacking()
-    names = {one.effect for one in strong}
-    chosen = [*model.accepted, *(one for one in candidates if one.free.effect.name in names)]
-    whole = refitted(full.model, chosen, full.given([one.key for one in chosen]), Reach.LOOK)
     apart = _constants(whole) - _constants(model)
     apart[3] = float(np.angle(np.exp(1j * apart[3])))
     sigmas = np.append(np.sqrt(np.diag(whole.fit.robust)[:3]), np.sqrt(whole.path(0).final_covariance[OFFSET, OFFSET]))

@@ -41,7 +41,7 @@ class FixSmoothing(Effect):
     name = "fix_smoothing"
     stage = "body"
     title = "fixes that the receiver smooths: each shows a mean of where the antenna was"
-    parameters = (Parameter("s", "s", 0.3, -0.1, 10.0, matters=0.1, hidden_sigma=TRANSPORT_S),)
+    parameters = (Parameter("s", "s", 0.3, -0.1, 10.0, "run", matters=0.1, hidden_sigma=TRANSPORT_S),)
     looks_like = "fixes lag in proportion to speed and cut every corner, and all radii come out too small"
     excited_by = "turn at two turn rates, and drive straights at two speeds"
     reference = "a first-order filter; Kaplan and Hegarty 2017, Understanding GPS/GNSS, on smoothing in receivers"

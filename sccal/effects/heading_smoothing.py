@@ -33,7 +33,7 @@ class HeadingSmoothing(Effect):
     name = "heading_smoothing"
     stage = "body"
     title = "AHRS readings that are smoothed: each shows a mean of the headings before it"
-    parameters = (Parameter("s", "s", 0.3, -0.1, 10.0, matters=0.1, hidden_sigma=STEP_S),)
+    parameters = (Parameter("s", "s", 0.3, -0.1, 10.0, "run", matters=0.1, hidden_sigma=STEP_S),)
     looks_like = "the heading lags in every turn and bends into it and out of it, and is right again on the straight"
     excited_by = "turn both ways, in turns that are shorter and longer than the smoothing"
     reference = "Mahony et al. 2008, Nonlinear complementary filters on the special orthogonal group"
