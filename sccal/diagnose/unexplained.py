@@ -55,8 +55,8 @@ def _strongest(loop: Loop) -> tuple[Unexplained, list[str]]:
         model = refitted(loop.model, [*kept, patterns[name]], reach=Reach.LOOK)
         if found := _told(model, patterns[name], keys):
             beside = posterior_of(model, {**prices(kept), name: PRICE_NATS})
-            needed = {one.accepted.key: LEAST_NATS if one.told else 0.0 for one in loop.sized}
-            return found, [key for key in keys if beside.worth(key, [*keys, name]) < needed[key]]
+            told = [one.accepted.key for one in loop.sized if one.told]
+            return found, [key for key in told if beside.worth(key, [*keys, name]) < LEAST_NATS]
     return Unexplained(False), []
 
 
