@@ -43,6 +43,8 @@ APART_S = 12.0
 EDGE_S = 20.0
 """Nothing is looked for so near to the ends: a step there is a start."""
 ZOOMS, POINTS = 3, 7
+HOPEFUL_NATS = 0.25 * (SEARCH_NATS + LEAST_NATS)
+"""What a moment or place must gain before it is looked at closely: a window beside it holds more than half of all."""
 RADII_M = (1.5, 3.0, 6.0)
 PLACE_RADII = 1.0
 AROUND = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)
@@ -328,6 +330,8 @@ def _search_time(scan: Scan, run: int, effects: Sequence[Effect], suspects: Floa
 
     gains = gains_at(tried)
     ordinary = [_ordinary(of_one) for of_one in gains[around.size :].T]
+    if np.max(gains - ordinary) < HOPEFUL_NATS:
+        return []
     best_s = float(tried[int(np.argmax(gains.max(axis=1)))])
     step = float(grid[1] - grid[0]) if best_s not in around else WINDOW_S
     for _ in range(ZOOMS):
@@ -372,7 +376,9 @@ def _search_place(scan: Scan, run: int, effect: Effect, suspects: Floats, grid: 
     anywhere = [at(float(s), RADII_M[1]) for s in grid]
     _, usual = scan.best(effect, anywhere)
     tries = [at(float(s), radius) for s in suspects for radius in RADII_M]
-    best, _ = scan.best(effect, [*tries, anywhere[int(np.argmax(usual))]])
+    best, gains = scan.best(effect, [*tries, anywhere[int(np.argmax(usual))]])
+    if gains.max() - _ordinary(usual) < HOPEFUL_NATS:
+        return []
     step = 1.0
     for _ in range(2 * ZOOMS):
         before = best

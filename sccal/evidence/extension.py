@@ -91,7 +91,8 @@ class Laid:
         if self.turned_rad is not None and free.delay_s(self.view, values.tolist()) is None:
             placed = _turned_back(placed, self.turned_rad)
         if not free.effect.bends_heading or not values.any():
-            return replace(self, count=self.count + 1, placed=(*self.placed, *placed))
+            together = (*self.placed, *placed)
+            return Laid(self.view, self.turned_rad, self.count + 1, together, self.known_rad, self.slope)
         seen = self.view.headings
         turned = replace(self.view, headings=replace(seen, yaw_rad=seen.yaw_rad + SMALL_RAD))
         does = free.turns(self.view, values)
@@ -174,11 +175,10 @@ class FreeEffects:
         if known is not None and same_age and found.turned_rad is known.turned_rad is None:
             found = known
         new = self._spans[found.count :]
-        stage_of = [STAGES.index(effect.stage) for effect, _ in self.parameters]
         for number, stage in enumerate(STAGES):
             here = [one for one in new if one[0].effect.stage == stage]
             if here and number:
-                before = [one for one in found.placed if stage_of[one.parameter] < number]
+                before = [one for one in found.placed if self._stages[one.parameter] < number]
                 found = replace(found, view=_after(seen, before, values))
             for free, first, last in here:
                 found = found.and_one(free, values[first:last], first)
@@ -214,10 +214,25 @@ class FreeEffects:
         ends = np.cumsum([0, *(len(free.parameters) for free in self.effects)]).tolist()
         return tuple((free, first, last) for free, (first, last) in zip(self.effects, pairwise(ends), strict=True))
 
+    @cached_property
+    def _delaying(self) -> tuple[tuple[Free, int, int], ...]:
+        """Those that make fixes or readings older than their stamps."""
+        plain = (Effect.fix_delay_s, Effect.heading_delay_s)
+        return tuple(
+            one
+            for one in self._spans
+            if (type(one[0].effect).fix_delay_s, type(one[0].effect).heading_delay_s) != plain
+        )
+
+    @cached_property
+    def _stages(self) -> list[int]:
+        """Of each parameter's effect, by number."""
+        return [STAGES.index(effect.stage) for effect, _ in self.parameters]
+
     def _delayed(self, view: DriveView, values: Floats) -> DriveView:
         """The drive with how old fixes and readings are at some values (f,)."""
         fixes_s, headings_s = np.zeros(view.fixes.t_s.size), 0.0
-        for free, first, last in self._spans:
+        for free, first, last in self._delaying:
             at = free.at(values[first:last].tolist())
             delay_s = free.effect.fix_delay_s(view, at)
             fixes_s = fixes_s if delay_s is None else fixes_s + delay_s

@@ -89,24 +89,53 @@ class Posterior:
 
     def evidence(self, kept: Sequence[str]) -> float:
         """Logarithm of the evidence of keeping some effects and no others, over that of keeping none, prices paid."""
-        found = self._evidence(self.places(kept)) - self._none - sum(self.price_nats.get(name, 0.0) for name in kept)
-        return found + self._mixed(kept) if np.isfinite(found) else found
+        return float(self.evidences([kept])[0])
 
-    def _mixed(self, kept: Sequence[str]) -> float:
-        """What priors of all widths add to the evidence of the fit's, each effect's beside the others as fitted."""
-        named = [name for name in kept if name in self.widths]
-        if not named:
-            return 0.0
-        mean, covariance = self.given(kept)
-        places = dict(zip(kept, self._within(kept), strict=True))
-        total = 0.0
-        for size in {places[name].size for name in named}:
-            same = [name for name in named if places[name].size == size]
-            rows = np.array([places[name] for name in same])
-            ends = np.log([self.widths[name] for name in same])
-            widths = np.exp(np.linspace(ends[:, 0], ends[:, 1], WIDTHS, axis=1))
-            total += float(mixture_evidence(mean[rows], covariance[rows[:, :, None], rows[:, None, :]], widths).sum())
+    def evidences(self, several: Sequence[Sequence[str]]) -> Floats:
+        """(n,) the same for several subsets at once.
+
+        Their blocks of the information are filled up with ones on the diagonal to one size, which changes nothing.
+        """
+        J, h = self._information
+        places = [self.places(kept) for kept in several]
+        size = max(some.size for some in places)
+        index = np.array([np.pad(some, (0, size - some.size)) for some in places])
+        real = np.arange(size) < np.array([some.size for some in places])[:, None]
+        block = np.where(real[:, :, None] & real[:, None, :], J[index[:, :, None], index[:, None, :]], np.eye(size))
+        score = np.where(real, h[index], 0.0)
+        covariance = np.linalg.inv(block)
+        mean = np.einsum("nij,nj->ni", covariance, score)
+        sign, logs = np.linalg.slogdet(block)
+        found = 0.5 * (np.einsum("ni,ni->n", mean, score) - logs) - self._none
+        found -= [sum(self.price_nats.get(name, 0.0) for name in kept) for kept in several]
+        found += self._mixed(several, mean, covariance)
+        return np.where((sign > 0.0) & np.isfinite(found), found, -np.inf)
+
+    def _mixed(self, several: Sequence[Sequence[str]], mean: Floats, covariance: Floats) -> Floats:
+        """(n,) what priors of all widths add to the evidence of the fit's, each effect's beside the others as fitted.
+
+        ``mean`` (n, k) and ``covariance`` (n, k, k) are those of each subset.
+        """
+        total = np.zeros(len(several))
+        of_size: dict[int, list[tuple[int, int, str]]] = {}
+        for number, kept in enumerate(several):
+            place = CONSTANTS
+            for name in kept:
+                if name in self.widths:
+                    of_size.setdefault(self.rows[name].size, []).append((number, place, name))
+                place += self.rows[name].size
+        for size, some in of_size.items():
+            subset = np.array([number for number, _, _ in some])[:, None]
+            rows = np.array([place for _, place, _ in some])[:, None] + np.arange(size)
+            widths = np.array([self._all_widths[name] for _, _, name in some])
+            blocks = covariance[subset[:, :, None], rows[:, :, None], rows[:, None, :]]
+            np.add.at(total, subset[:, 0], mixture_evidence(mean[subset, rows], blocks, widths))
         return total
+
+    @cached_property
+    def _all_widths(self) -> dict[str, Floats]:
+        """Of each effect's priors (WIDTHS,)."""
+        return {name: np.geomspace(*ends, WIDTHS) for name, ends in self.widths.items()}
 
     def _within(self, kept: Sequence[str]) -> list[Ints]:
         """Places of each kept effect's parameters among those of ``given``."""
@@ -115,16 +144,9 @@ class Posterior:
 
     @cached_property
     def _none(self) -> float:
-        return self._evidence(self.places(()))
-
-    def _evidence(self, places: Ints) -> float:
         J, h = self._information
-        try:
-            root = np.linalg.cholesky(J[np.ix_(places, places)])
-        except np.linalg.LinAlgError:
-            return -np.inf
-        scaled = np.linalg.solve(root, h[places])
-        return float(0.5 * scaled @ scaled - np.log(np.diag(root)).sum())
+        block, score = J[:CONSTANTS, :CONSTANTS], h[:CONSTANTS]
+        return 0.5 * float(score @ np.linalg.solve(block, score) - np.linalg.slogdet(block)[1])
 
     def given(self, kept: Sequence[str]) -> tuple[Floats, Floats]:
         """Mean (3 + k,) and covariance of constants and kept parameters if the rest is zero, in their priors' units."""
@@ -184,7 +206,7 @@ class Posterior:
             own, block = mean[place], covariance[np.ix_(place, place)]
             worth = 0.5 * float(own @ np.linalg.solve(block, own)) + 0.5 * float(np.linalg.slogdet(block)[1])
             if name in self.widths:
-                widths = np.geomspace(*self.widths[name], WIDTHS)[None, :]
+                widths = self._all_widths[name][None, :]
                 worth += float(mixture_evidence(own[None, :], block[None, :, :], widths)[0])
             worths.append(worth - self.price_nats.get(name, 0.0))
         return worths
@@ -199,10 +221,12 @@ class Posterior:
             if len(kept) <= MOST_SWAPPED:
                 swaps = [[*(one for one in kept if one != gone), name] for gone in kept for name in others]
             for some in (moves, swaps):
-                values = [self.evidence(move) for move in some]
-                place = int(np.argmax(values)) if values else -1
-                if values and values[place] > best + 1e-9:
-                    best, kept = values[place], some[place]
+                if not some:
+                    continue
+                values = self.evidences(some)
+                place = int(np.argmax(values))
+                if values[place] > best + 1e-9:
+                    best, kept = float(values[place]), some[place]
                     break
             else:
                 return kept
