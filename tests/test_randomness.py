@@ -32,7 +32,7 @@ def test_they_are_normal_independent_and_even() -> None:
     np.testing.assert_allclose(np.histogram(even, 10, (0, 1))[0] / even.size, 0.1, atol=0.005)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.01, 1000), st.floats(0, 2e9), st.integers(0, 99), st.floats(0.01, 5))
 def test_a_subset_of_the_times_gets_the_same_values(tau_s: float, start_s: float, seed: int, step_s: float) -> None:
     t_s = start_s + step_s * np.arange(60)

@@ -43,7 +43,7 @@ def logs(draw):
 
 
 @given(logs())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_increments_add_up_to_the_whole_angle(aligned_by_hand, log):
     timeline = build_timeline(aligned_by_hand(**log), heading_rate_hz=np.inf, fix_rate_hz=np.inf)
     for steps, cumulative in ((timeline.right_rad, log["right_rad"]), (timeline.left_rad, log["left_rad"])):
@@ -54,7 +54,7 @@ def test_increments_add_up_to_the_whole_angle(aligned_by_hand, log):
 
 
 @given(logs())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_every_measurement_has_one_row_at_its_own_time(aligned_by_hand, log):
     aligned = aligned_by_hand(**log)
     assume(not aligned.standing_s)
@@ -75,7 +75,7 @@ def test_every_measurement_has_one_row_at_its_own_time(aligned_by_hand, log):
 
 
 @given(logs())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_loose_variance_adds_up(aligned_by_hand, log):
     timeline = build_timeline(aligned_by_hand(**log))
     expected = 0.0
@@ -98,7 +98,7 @@ def test_loose_variance_stands_between_the_two_samples(aligned_by_hand):
 
 
 @given(logs(), st.floats(0.0, 0.45), st.floats(0.55, 1.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_part_holds_only_what_is_between_its_ends(aligned_by_hand, log, begin, end):
     whole_s = log["wheel_t_s"][-1] - log["wheel_t_s"][0]
     first, last = (float(log["wheel_t_s"][0] + share * whole_s) for share in (begin, end))

@@ -40,7 +40,7 @@ def test_noise_about_a_heading_is_not_sorted_into_a_trend(legs_deg: tuple[float,
 
 
 @given(st.integers(0, 10_000), st.integers(2, 400))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_means_are_those_of_a_loop(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     x, y = rng.normal(size=count), rng.normal(size=count)

@@ -331,7 +331,7 @@ FAULTS = st.sampled_from(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.lists(
         st.tuples(st.integers(0, 8), WHERE, LON, GARBAGE, st.sampled_from(["\n", "\r\n", " \n", "\r"])), min_size=2

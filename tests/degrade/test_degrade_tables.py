@@ -134,7 +134,7 @@ def test_missing_columns_are_named() -> None:
         degrade_gnss_csv(b"t,lat_deg,lon_deg\n1,0,0\n", Faults(), SPAN, "run")
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.lists(st.one_of(st.integers(0, 9), st.binary(max_size=20)), min_size=1, max_size=30),
     st.sampled_from([b"\n", b"\r\n"]),

@@ -81,7 +81,7 @@ def test_at_zero_they_are_the_harmonics():
     assert sin == pytest.approx(np.radians(np.sin(TURN)))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
 def test_values_times_columns_are_the_deviation_of_any_field(cos_deg, sin_deg):
     cos, sin = deviation_columns(TURN, cos_deg, sin_deg)
@@ -92,7 +92,7 @@ def test_values_times_columns_are_the_deviation_of_any_field(cos_deg, sin_deg):
     assert np.max(np.abs(cos_deg * cos + sin_deg * sin)) <= np.pi + 1e-9
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.floats(0.0, 6.3), st.floats(0.02, 0.8), st.floats(0.0, 6.3))
 def test_across_the_values_they_are_the_slope(angle, strength, way):
     """Between two fields of one strength the deviation changes as the columns say."""

@@ -58,7 +58,7 @@ def test_readings_at_one_time_are_harmless():
     assert twice[::2] == pytest.approx(low_passed(np.sin(UNEVEN_S), UNEVEN_S, 5.0))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(0.01, 120.0))
 def test_it_is_linear_and_takes_columns(a, b, tau_s):
     x, y = np.sin(3.0 * UNEVEN_S), np.cos(UNEVEN_S)

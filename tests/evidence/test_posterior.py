@@ -58,7 +58,7 @@ class Problem:
         return [kept for k in range(len(self.names) + 1) for kept in combinations(self.names, k)]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(1, 5), st.integers(0, 10_000), st.floats(0.0, 0.9))
 def test_the_evidence_is_the_difference_of_the_marginal_likelihoods(effects, seed, alike):
     problem = Problem(effects, seed, alike=alike)
@@ -91,7 +91,7 @@ def test_every_kept_effect_costs_its_price():
         assert dear.evidence(kept) == pytest.approx(free.evidence(kept) - 3.0 * len(kept))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1, 5), st.integers(0, 10_000))
 def test_values_given_that_the_rest_is_zero_are_those_of_the_smaller_problem(effects, seed):
     problem = Problem(effects, seed)
@@ -105,7 +105,7 @@ def test_values_given_that_the_rest_is_zero_are_those_of_the_smaller_problem(eff
         np.testing.assert_allclose(found, covariance, atol=1e-8)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.sampled_from([0.0, 0.5, 0.9]), st.floats(0.0, 6.0))
 def test_the_subset_of_most_evidence_is_found_among_all(seed, alike, price):
     """By brute force over the subsets of eight, effects that look much alike among them."""

@@ -21,7 +21,7 @@ def empty(parameters: int) -> Belief:
     return Belief(np.arange(float(n)), np.arange(float(m)), np.zeros((n, n)), np.zeros((n, m)), np.zeros((m, m)))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 12), st.integers(0, 10_000))
 def test_split_and_joined_again_is_the_same(parameters, seed):
     covariance = random_covariance(BASE_STATES + parameters, seed)
@@ -34,7 +34,7 @@ def test_split_and_joined_again_is_the_same(parameters, seed):
     assert np.array_equal(belief.p, np.arange(float(parameters)))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 8), st.integers(0, 10_000))
 def test_the_core_is_what_is_left_when_the_parameters_are_known(parameters, seed):
     covariance = random_covariance(BASE_STATES + parameters, seed)

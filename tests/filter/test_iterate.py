@@ -65,7 +65,7 @@ class Linear:
         return SimpleNamespace(final_state=state, final_covariance=whole)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 6), st.integers(0, 10_000), st.floats(0.0, 3.0))
 def test_the_likelihood_is_that_of_the_true_prior_wherever_a_pass_started(effects, seed, away):
     run = Linear(effects, seed)
@@ -83,7 +83,7 @@ def test_a_pass_that_starts_at_the_priors_mean_needs_no_shift():
     assert prior_shift_nats(run.problem(), at, run.passed(run.mean)) == pytest.approx(0.0, abs=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(1, 6), st.integers(0, 10_000), st.sampled_from([0.1, 0.5]))
 def test_a_pass_with_narrower_priors_is_made_whole_again(effects, seed, scale):
     """Mean, covariance and likelihood of the linear problem under its own prior, from those under a narrower one."""

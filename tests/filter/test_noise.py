@@ -39,7 +39,7 @@ def looked(function, signs):
     return look, asked
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 7), st.integers(0, 10_000), st.floats(0.0, 4.0))
 def test_the_least_of_levels_that_the_log_shows_unevenly_is_found(size, seed, log_condition):
     """Some are shown by thousands of readings, some are held by the prior alone, and neighbours hang together."""
@@ -53,7 +53,7 @@ def test_the_least_of_levels_that_the_log_shows_unevenly_is_found(size, seed, lo
     assert len(asked) < 6 * (size + 1)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(2, 7), st.integers(0, 10_000))
 def test_it_never_ends_higher_than_it_began_and_never_outside(size, seed):
     """Even where the curvature that is expected is not the one there is, and there are several hills."""
@@ -72,7 +72,7 @@ def test_it_never_ends_higher_than_it_began_and_never_outside(size, seed):
     assert np.all((reached >= low - 1e-9) & (reached <= high + 1e-9))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(2, 6), st.integers(0, 10_000))
 def test_a_least_at_a_bound_is_found_there(size, seed):
     """One level wants to vanish (fixes that do not wander); the others are found beside it all the same."""

@@ -94,7 +94,7 @@ def test_wraps_inside_a_gap_follow_the_speed_around_it(tmp_path: Path, gap_s: fl
         assert found(notices, "gaps").count == 3
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000),
     bits=st.sampled_from([16, 32]),
@@ -287,7 +287,7 @@ def test_counts_that_no_motion_explains_are_an_error(tmp_path: Path) -> None:
         read(tmp_path, t_s, noise)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(st.integers(0, 3000), st.integers(-(2**33), 2**33), st.integers(-70000, 70000)),

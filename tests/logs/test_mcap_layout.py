@@ -72,7 +72,7 @@ joint_states = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(joint_states, min_size=1, max_size=20))
 def test_cdr_is_read_as_the_stock_decoder_reads_it(values: list[dict[str, Any]]) -> None:
     messages = [cdr(JOINTS, one) for one in values]
@@ -80,7 +80,7 @@ def test_cdr_is_read_as_the_stock_decoder_reads_it(values: list[dict[str, Any]])
     assert found == [flat(as_dict(decoded(JOINTS, raw))) for raw in messages]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(joint_states, min_size=1, max_size=8))
 def test_either_byte_order_reads_the_same(values: list[dict[str, Any]]) -> None:
     from rosbags.typesys import Stores, get_typestore
@@ -108,7 +108,7 @@ def test_parameter_lists_are_refused_and_counted() -> None:
     assert "0003" in gatherer.why
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(joint_states, st.data())
 def test_no_bytes_make_the_walk_leave_the_message(value: dict[str, Any], data: st.DataObject) -> None:
     raw = bytearray(cdr(JOINTS, value))
@@ -187,7 +187,7 @@ outer = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(outer, min_size=1, max_size=12))
 def test_protobuf_is_read_as_the_stock_decoder_reads_it(values: list[dict[str, Any]]) -> None:
     classes, descriptors = proto_classes("some.pack", KINDS)
@@ -204,7 +204,7 @@ def test_protobuf_is_read_as_the_stock_decoder_reads_it(values: list[dict[str, A
     assert take(Gatherer(walker, everything), [make(value) for value in values]) == [flat(value) for value in values]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(joint_states, min_size=1, max_size=12))
 def test_json_is_read_as_written(values: list[dict[str, Any]]) -> None:
     found = take(JsonGatherer(everything), [json.dumps(value).encode() for value in values])

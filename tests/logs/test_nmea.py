@@ -66,7 +66,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert not notices
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(-90, 90), st.floats(-180, 180), st.floats(0, 4e9))
 def test_any_place_and_time_survive(
     tmp_path_factory: pytest.TempPathFactory, lat_deg: float, lon_deg: float, utc_s: float
@@ -110,7 +110,7 @@ def plain_fixes(lines: list[str]) -> list[tuple[float, float, float, int]]:
     return fixes
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 255), st.integers(0, 70)), min_size=20, max_size=60))
 def test_agrees_with_the_plain_reader(
     tmp_path_factory: pytest.TempPathFactory, faults: list[tuple[int, int, int]]

@@ -123,7 +123,7 @@ def each(kind: Kind) -> Callable[[Callable[..., None]], Callable[..., None]]:
 
 @pytest.mark.parametrize("kind", BODIES)
 def test_numbers_agree_to_the_last_bit(kind: Kind) -> None:
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @each(kind)
     def agree(bodies: list[str]) -> None:
         lines = [sentence(body) for body in bodies]
@@ -141,7 +141,7 @@ def test_numbers_agree_to_the_last_bit(kind: Kind) -> None:
 def test_positions_and_times_agree(kind: Kind) -> None:
     """Degrees to the ten places that the other parser rounds to."""
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(BODIES[kind].filter(lambda body: kind != Kind.GNS or set(body.split(",")[6]) & set("ADRF")))
     def agree(body: str) -> None:
         line = sentence(body)
@@ -160,7 +160,7 @@ def test_positions_and_times_agree(kind: Kind) -> None:
     agree()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(CLOCK, *(decimal(-89, 89) for _ in range(5)), st.integers(1, 3)), min_size=1, max_size=9))
 def test_ksxt_agrees(rows: list[tuple[str, ...]]) -> None:
     lines = [
@@ -175,7 +175,7 @@ def test_ksxt_agrees(rows: list[tuple[str, ...]]) -> None:
     assert heading.yaw_rad[0] == np.radians(float(rows[0][4]))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(decimal(-(10**9), 10**9, 10), min_size=1, max_size=30))
 def test_decimals_are_rounded_as_python_rounds(texts: list[str]) -> None:
     data = np.frombuffer((",".join(texts)).encode() + bytes(64), dtype=np.uint8)

@@ -72,7 +72,7 @@ def test_receive_times_from_zero_say_nothing_about_the_date() -> None:
     assert not notices
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.integers(1, 18),
     st.sampled_from([0.1, 0.2, 1.0]),

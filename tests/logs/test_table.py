@@ -218,7 +218,7 @@ def test_a_pause_of_hours_is_no_fault(tmp_path: Path) -> None:
     assert not got.notices
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(-1e10, 1e10) | st.integers(0, 50).map(float), min_size=1, max_size=40))
 def test_any_times_become_strictly_increasing(tmp_path_factory: pytest.TempPathFactory, times: list[float]) -> None:
     try:
@@ -255,7 +255,7 @@ LINES = st.sampled_from(
 BYTES = st.binary(max_size=200) | st.lists(LINES | st.binary(max_size=12), max_size=8).map(b"".join)
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(data=BYTES)
 @example(data=b"t,yaw_deg\n1e400,1\n")
 @example(data=b"t,left_ticks,right_ticks\n0,99999999999999999999,1\n1,2,3")

@@ -91,7 +91,7 @@ def test_counts_are_what_is_there():
     assert {root.get("errors"), root.get("failures")} == {"2", "4"}
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(anything, anything, anything, anything)
 def test_whatever_names_hold_the_document_is_valid(name, of, reason, message):
     runs = (saved(calibration(name, of, track_m=estimate(0.7, 0.2, "unobserved", reason))), saved(calibration(name)))

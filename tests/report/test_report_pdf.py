@@ -45,7 +45,7 @@ def test_the_paper_is_a4(a_run: Calibration, box: bytes) -> None:
 
 
 @given(st.text(alphabet="abc iWm", max_size=200), st.floats(40.0, 300.0))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_wrapping_keeps_every_word_and_no_line_is_wider(text: str, width: float) -> None:
     lines = wrapped(text, 9.0, width)
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")

@@ -147,7 +147,7 @@ def test_general_is_seeded():
     assert not np.array_equal(one, other)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     distance_m=st.floats(0.05, 40.0),
     backwards=st.booleans(),

@@ -116,7 +116,7 @@ def test_gauss_markov_is_stationary_from_its_first_sample():
     assert first.std(axis=0) == pytest.approx([0.4, 0.4], rel=0.07)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     bits=st.sampled_from([8, 16, 24, 32]),
     signed=st.booleans(),

@@ -87,7 +87,7 @@ def test_forward_is_along_the_yaw_and_side_is_to_its_left(yaw_deg):
     assert (aside.east_m[-1], aside.north_m[-1]) == pytest.approx((-3 * math.sin(yaw), 3 * math.cos(yaw)))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     along_m=st.floats(-0.01, 0.01),
     side_m=st.floats(-0.01, 0.01),
