@@ -137,6 +137,13 @@ class Effect(ABC):
         """How much older the AHRS readings are than their stamps say."""
         return 0.0
 
+    def shown_turning(self, drive: DriveView, at: Mapping[str, float], turn_rad: Floats) -> Floats | None:
+        """What it adds to the readings (h, k) where the robot turned further, by (n, k) in the motion events.
+
+        None for effects that do not depend on how the robot turned. What else turns the robot is then seen through it.
+        """
+        return None
+
     @abstractmethod
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         """Columns of all parameters that are not shapes; ``at`` holds the current values of all (file units).

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from sccal.arrays import Floats
 from sccal.effects.effect import Column, Effect, Parameter
 from sccal.effects.gnss_latency import mean_rates
@@ -43,6 +45,13 @@ class HeadingLatency(Effect):
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         _, turn_rate = mean_rates(drive.steps, drive.headings.t_s, at["s"])
         return (Column("s", "heading", -turn_rate),)
+
+    def shown_turning(self, drive: DriveView, at: Mapping[str, float], turn_rad: Floats) -> Floats | None:
+        now, then = (
+            np.column_stack([np.interp(t_s, drive.steps.t_s, one) for one in turn_rad.cumsum(axis=0).T])
+            for t_s in (drive.headings.t_s, drive.headings.t_s - at["s"])
+        )
+        return np.asarray(then - now)
 
     def physics(self, values: Mapping[str, float]) -> Physics:
         return _Late(values["s"])

@@ -49,6 +49,10 @@ class HeadingSmoothing(Effect):
         late = behind(np.cumsum(steps.turn_rad), steps.t_s, at["s"])
         return (Column("s", "heading", drive.at_headings(late)),)
 
+    def shown_turning(self, drive: DriveView, at: Mapping[str, float], turn_rad: Floats) -> Floats | None:
+        late = at["s"] * behind(turn_rad.cumsum(axis=0), drive.steps.t_s, at["s"])
+        return np.column_stack([drive.at_headings(one) for one in late.T])
+
     def physics(self, values: Mapping[str, float]) -> Physics:
         return _Smoothing(values["s"])
 

@@ -84,6 +84,8 @@ class Laid:
     known_rad: Floats | float = 0.0
     """Of the heading's readings (h,), beside the columns."""
     slope: Floats | float = 0.0
+    one_by_one: Laid | None = None
+    """The same before what the effects do to each other: where further ones begin."""
 
     def and_one(self, free: Free, values: Floats, first: int) -> Laid:
         """With one more effect, its parameters (k,) numbered from ``first``."""
@@ -173,7 +175,7 @@ class FreeEffects:
         found = Laid(seen, _turned_rad(seen))
         same_age = known is not None and seen.heading_delay_s == known.view.heading_delay_s
         if known is not None and same_age and found.turned_rad is known.turned_rad is None:
-            found = known
+            found = replace(known.one_by_one or known, view=seen)
         new = self._spans[found.count :]
         for number, stage in enumerate(STAGES):
             here = [one for one in new if one[0].effect.stage == stage]
@@ -182,7 +184,37 @@ class FreeEffects:
                 found = replace(found, view=_after(seen, before, values))
             for free, first, last in here:
                 found = found.and_one(free, values[first:last], first)
-        return replace(self._with_older(found, values), view=seen)
+        return replace(self._seen_through(self._with_older(found, values), values), view=seen, one_by_one=found)
+
+    def _seen_through(self, found: Laid, values: Floats) -> Laid:
+        """With what further turning does to the readings through effects that show the robot as it turned before.
+
+        A wheel that wobbles at every turn is hardly seen by an AHRS that smooths: whoever expects to see it there finds
+        one that is not.
+        """
+        turns = {
+            "right_wheel": 1.0 / found.view.steps.track_m,
+            "left_wheel": -1.0 / found.view.steps.track_m,
+            "turn": 1.0,
+        }
+        moving = [one for one in found.placed if one.column.port in turns]
+        through = [(free, first, last) for free, first, last in self._spans if values[first:last].any()]
+        if not moving or not through:
+            return found
+        turned = np.column_stack([turns[one.column.port] * one.column.values for one in moving])
+        shown = [
+            seen
+            for free, first, last in through
+            if (seen := free.effect.shown_turning(found.view, free.at(values[first:last].tolist()), turned)) is not None
+        ]
+        if not shown:
+            return found
+        added = np.sum(shown, axis=0)
+        more = tuple(
+            Placed(one.parameter, Column("", "heading", column)) for one, column in zip(moving, added.T, strict=True)
+        )
+        known = found.known_rad - added @ values[[one.parameter for one in moving]]
+        return replace(found, placed=(*found.placed, *more), known_rad=known)
 
     def _with_older(self, found: Laid, values: Floats) -> Laid:
         """The derivative by the readings' age, with what the other effects do there: they too are shown as they were.
