@@ -1,7 +1,8 @@
 """The kinds of sentences: where each holds what, how it tells the quality of a fix, and how a lost fix looks in it.
 
 One row of LAYOUTS is all that the reader and ``sccal degrade`` know of a kind. Fields are counted from 1 after the
-address, $PTNL's after the name that follows it. All qualities are told in the numbers of GGA. Sources:
+address; after the name that follows it where a maker's address of four letters, such as $PTNL, has names of its own.
+All qualities are told in the numbers of GGA. Sources:
 
 * GGA, GNS, RMC, GLL, VTG, GST, ZDA, HDT: NMEA 0183 version 4.10 and IEC 61162-1. Mode letters: A autonomous,
   D differential, E estimated, F float RTK, M manual, N no fix, P precise, R real-time kinematic, S simulator. GNS has
@@ -278,11 +279,11 @@ LAYOUTS: dict[Kind, Layout] = {
     ),
     Kind.PUBX: Layout(
         "PUBX,00",
-        fewest=18,
-        time=2,
+        fewest=17,
+        time=1,
         position=Position(
-            3, 5, quality=8, claim=_PUBX, hdop=15, accuracy_m=9, emptied=(7, 9, 10, 11, 12, 13, 14),
-            lost=((8, "NF"), (15, "99.99"), (16, "99.99"), (17, "99.99"), (18, "0")),
+            2, 4, quality=7, claim=_PUBX, hdop=14, accuracy_m=8, emptied=(6, 8, 9, 10, 11, 12, 13),
+            lost=((7, "NF"), (14, "99.99"), (15, "99.99"), (16, "99.99"), (17, "0")),
         ),
     ),
     Kind.PASHR_POS: Layout(

@@ -47,22 +47,19 @@ def _pattern(text: bytes) -> tuple[np.uint64, np.uint64]:
 _SMALL = np.uint64(0x6060606060)
 _UPPER = np.uint64(0xDFDFDFDFDFDFDFDF)
 _FORMATTERS = {_word(layout.name.encode()): kind for kind, layout in LAYOUTS.items() if len(layout.name) == 3}
-_NAMES = {
-    Kind.PASHR: _pattern(b"PASHR,"),
-    Kind.KSXT: _pattern(b"KSXT,"),
-    Kind.GGK: _pattern(b"PTNLGGK,"),
-    Kind.PUBX: _pattern(b"PUBX,00,"),
-    Kind.TAR: _pattern(b"PQTMTAR,"),
-    Kind.UNIHEADING: _pattern(b"UNIHEADI"),
-    Kind.HEADING: _pattern(b"HEADING"),
-    Kind.DUAL_HEADING: _pattern(b"DUALANTE"),
-}
-_NAMED_AFTER = (
-    (_pattern(b"PTNL,"), {Kind.AVR: _pattern(b"AVR,"), Kind.GGK: _pattern(b"GGK,")}),
-    (_pattern(b"PSSN,"), {Kind.HRP: _pattern(b"HRP,")}),
-    (_pattern(b"PSAT,"), {Kind.PSAT_HPR: _pattern(b"HPR,")}),
-    (_pattern(b"PSXN,"), {Kind.PSXN: _pattern(b"23,")}),
-)
+_OF_MAKERS = [
+    *((kind, one.name) for kind, one in LAYOUTS.items() if kind not in OF_SECOND_ANTENNA and len(one.name) > 3),
+    (Kind.GGK, "PTNLGGK"),
+    (Kind.HEADING, "HEADING2"),
+]
+"""Kinds and names of sentences whose address begins with no talker, and what else they are called."""
+_NAMES = [(kind, _pattern(f"{name},".encode()[:8])) for kind, name in _OF_MAKERS if "," not in name]
+_NAMED_AFTER = [
+    (_pattern(f"{maker},".encode()), kind, _pattern(f"{own},".encode()))
+    for kind, name in _OF_MAKERS
+    for maker, comma, own in (name.partition(","),)
+    if comma and len(maker) == 4
+]
 """Makers' addresses of four letters, and the names of sentences in the field after them."""
 _ASHTECH_NAMES = {Kind.PASHR_POS: _pattern(b"POS,"), Kind.PASHR_ATT: _pattern(b"ATT,")}
 """In the field after the address ``$PASHR``."""
@@ -301,13 +298,12 @@ def _kinds(words: Words, start: Ints, stop: Ints) -> tuple[Kinds, NDArray[np.uin
     shift = np.zeros(start.size, dtype=np.int64)
     own = np.flatnonzero(~usual & (start + 6 < stop))
     if own.size:
-        for name, pattern in _NAMES.items():
+        for name, pattern in _NAMES:
             kind[own[_reads(address[own], pattern)]] = name
-        for maker, names in _NAMED_AFTER:
+        for maker, name, pattern in _NAMED_AFTER:
             made = own[_reads(address[own], maker)]
-            for name, pattern in names.items():
-                rows = made[_reads(words[start[made] + 6], pattern)]
-                kind[rows], shift[rows] = name, 1
+            rows = made[_reads(words[start[made] + 6], pattern)]
+            kind[rows], shift[rows] = name, 1
         for name, pattern in _LONG_ADDRESSES.items():
             kind[own[_reads(address[own] >> _TALKER_BITS, pattern)]] = name
     return kind, talker, shift
