@@ -22,11 +22,11 @@ from sccal.effects.catalogue import CATALOGUE
 from sccal.inspect.inspect import inspect_run
 from sccal.logs.run import discover, read_run
 from sccal.logs.write import write_text
-from sccal.report.diagnosis_figures import residual_picture
-from sccal.report.figures import BLUE, PAPER, plain_ticks, styled, svg_text
-from sccal.report.figures_series import parameters_plan
-from sccal.report.plan import drawn
+from sccal.report.diagnosis.figures import residual_picture
+from sccal.report.drawing.plan import drawn
+from sccal.report.drawing.style import BLUE, PAPER, plain_ticks, styled, svg_text
 from sccal.report.rows import Row, parameter_rows
+from sccal.report.run.figure_series import parameters_plan
 from sccal.results.calibration import Calibration
 from sccal.results.numbers import plain
 from sccal.simulate.choose import settings_from

@@ -52,7 +52,7 @@ FILE_NAMES = re.compile(
     r"\b(encoder\.csv|ahrs\.csv|gnss\.(nmea|csv)|vehicle\.toml|metadata\.yaml)\b|(?<![\w*])\.(mcap|db3|bag)\b"
 )
 SPELL_FILE_NAMES = {"logs/names.py", "logs/formats.py"}
-SAY_VEHICLE_TOML = {"batch/remote.py", "gates/baseline.py", "report/inspect_lines.py"}
+SAY_VEHICLE_TOML = {"batch/remote.py", "gates/baseline.py", "report/inspection/lines.py"}
 """Modules that spell no other name, and this one in what they say or look for."""
 LONGEST_MODULE = 600
 NAMES_OF_NOTHING = {"utils", "util", "helpers", "helper", "common", "misc"}
@@ -130,7 +130,7 @@ else:
     import math
 def late():
     try:
-        from sccal.report import text, html
+        from sccal.report import layout, write
     except ImportError:
         import sccal.batch
 """
@@ -139,8 +139,8 @@ def late():
         "numpy",
         "typing.TYPE_CHECKING",
         "math",
-        "sccal.report.text",
-        "sccal.report.html",
+        "sccal.report.layout",
+        "sccal.report.write",
         "sccal.batch",
     ]
     assert [name for _, name in imported(ast.parse(source), at_start_only=True)] == found[:3]

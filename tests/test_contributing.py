@@ -26,7 +26,7 @@ heading, _ = parse_nmea_heading("\\n".join([*lines, ""]).encode(), "gnss.nmea")
 print(heading.source, np.degrees(heading.yaw_rad).round(3).tolist())
 """
 PAGE = """
-from sccal.report.html import run_html
+from sccal.report.run.page import run_html
 from tests.report.conftest import run
 print(run_html(run()))
 """

@@ -14,8 +14,7 @@ from sccal.filter.forward import say_if_compiling
 from sccal.filter.start import find_start
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import find_runs, read_run
-from sccal.report.diagnosis_write import write_diagnosis
-from sccal.report.write import begin_loading
+from sccal.report.write import begin_loading, write_diagnosis
 from sccal.results.diagnosis import Diagnosis
 
 

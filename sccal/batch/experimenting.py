@@ -10,7 +10,7 @@ from sccal.errors import DataError, Failure
 from sccal.experiments.experiments import run_experiments
 from sccal.filter.forward import say_if_compiling
 from sccal.logs.run import find_runs
-from sccal.report.experiments_write import write_experiments
+from sccal.report.write import write_experiments
 from sccal.results.experiments import Experiments
 
 

@@ -11,8 +11,7 @@ from sccal.filter.forward import say_if_compiling
 from sccal.inspect.inspect import inspect_run
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import find_runs
-from sccal.report.inspect_write import write_inspection
-from sccal.report.write import begin_loading
+from sccal.report.write import begin_loading, write_inspection
 from sccal.results.inspection import Inspection
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from sccal.batch.calibrating import Batch
 from sccal.gates.asked import Asked
 from sccal.logs.write import write_text
-from sccal.report.index_write import write_summary
-from sccal.report.junit import junit_xml
-from sccal.report.step_summary import append_step_summary
+from sccal.report.fleet.junit import junit_xml
+from sccal.report.fleet.step_summary import append_step_summary
+from sccal.report.write import write_summary
 from sccal.results.gates import BatchOutcome
 from sccal.summary import summarise
 

@@ -161,7 +161,7 @@ def _serve(connection: Connection) -> None:
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
     importlib.import_module("sccal.batch.tasks")
-    importlib.import_module("sccal.report.html")
+    importlib.import_module("sccal.report.run.page")
     # What is loaded stays; looking through it again and again for garbage costs a tenth of the work.
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)

@@ -186,7 +186,8 @@ class _Teller:
 
 
 def _tell_batch(batch: Batch, out: Path, index: Path | None) -> None:
-    from sccal.report.text import run_text, vehicle_text
+    from sccal.report.run.text import run_text
+    from sccal.report.vehicle.text import vehicle_text
 
     if batch.unchanged:
         print(f"{batch.unchanged} of {len(batch.runs)} results stood already and were not made again")
@@ -202,7 +203,7 @@ def _tell_batch(batch: Batch, out: Path, index: Path | None) -> None:
 
 
 def _tell_gates(outcome: BatchOutcome) -> None:
-    from sccal.report.gates_text import gates_text
+    from sccal.report.fleet.gates import gates_text
 
     text = gates_text(outcome.gates, columns())
     if text:

@@ -31,7 +31,7 @@ def compare(
 
         print(json_text(document_of(comparison)), end="")
     else:
-        from sccal.report.compare_text import compare_text
+        from sccal.report.comparison.text import compare_text
 
         print(compare_text(comparison, columns()), end="")
     if not comparison.comparable:

@@ -31,7 +31,7 @@ def diagnose(
     require_any_log(paths)
     from sccal.batch import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
-    from sccal.report.diagnosis_text import diagnosis_text, next_line
+    from sccal.report.diagnosis.text import diagnosis_text, next_line
     from sccal.results.files import MODEL_FILE
 
     options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)

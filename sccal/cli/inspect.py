@@ -29,7 +29,7 @@ def inspect_(
 ) -> None:
     """What is in the logs below PATHS before anything is estimated, and what their drives can show."""
     from sccal.batch import inspect_paths
-    from sccal.report.inspect_text import inspection_text
+    from sccal.report.inspection.text import inspection_text
     from sccal.results.converter import document_of, json_text
     from sccal.results.inspection import InspectFailure, Inspections
 

@@ -11,7 +11,7 @@ import pytest
 from sccal.align import align
 from sccal.errors import DataError
 from sccal.logs.streams import Run
-from sccal.report.summary import clock_line
+from sccal.report.sentences import clock_line
 
 REPEATING = ("rectangle", "rows", "figure8")
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sccal.compare.calibrations import compare_calibrations
-from sccal.report.compare_text import compare_text, headline
+from sccal.report.comparison.text import compare_text, headline
 from sccal.results.converter import document_of
 from tests.results.documents import calibration, estimate, saved, vehicle
 

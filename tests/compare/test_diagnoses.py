@@ -3,7 +3,7 @@
 import pytest
 
 from sccal.compare.diagnoses import compare_diagnoses
-from sccal.report.compare_text import compare_text, headline
+from sccal.report.comparison.text import compare_text, headline
 from sccal.results.converter import document_of, result_from
 from sccal.results.diagnosis import Diagnosis
 

@@ -13,7 +13,7 @@ from sccal.batch import calibrate_paths
 from sccal.calibration.options import CalibrationOptions
 from sccal.diagnose.diagnose import diagnose
 from sccal.logs.run import discover, read_run
-from sccal.report.diagnosis_text import diagnosis_text
+from sccal.report.diagnosis.text import diagnosis_text
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 LOGS = Path(__file__).resolve().parents[2].parent / "shared" / "logs"

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from sccal.cli import main
-from sccal.report.inspect_html import inspection_html
-from sccal.report.inspect_text import inspection_text
+from sccal.report.inspection.page import inspection_html
+from sccal.report.inspection.text import inspection_text
 from tests.inspect.logs import inspected
 
 pytestmark = pytest.mark.filterwarnings("error")

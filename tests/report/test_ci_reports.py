@@ -16,9 +16,9 @@ from sccal.gates.allowance import parse_allowance
 from sccal.gates.baseline import Baseline, Earlier, judge_drift
 from sccal.gates.expression import parse_gates
 from sccal.gates.judge import judge
-from sccal.report.gates_text import gates_text
-from sccal.report.junit import junit_xml
-from sccal.report.step_summary import MOST_BYTES, append_step_summary, cut, escaped, step_summary
+from sccal.report.fleet.gates import gates_text
+from sccal.report.fleet.junit import junit_xml
+from sccal.report.fleet.step_summary import MOST_BYTES, append_step_summary, cut, escaped, step_summary
 from sccal.results.converter import document_of, json_text
 from sccal.results.gates import BatchOutcome, GateResult
 from tests.results.documents import calibration, estimate, saved, vehicle

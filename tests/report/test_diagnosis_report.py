@@ -16,10 +16,10 @@ import pytest
 
 from sccal.effects.catalogue import CATALOGUE
 from sccal.logs.streams import Notice, Vehicle
-from sccal.report.diagnosis_figures import candidates, drift_before_after, finding_drawings, residual_picture
-from sccal.report.diagnosis_html import diagnosis_html
-from sccal.report.diagnosis_text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
-from sccal.report.diagnosis_write import write_diagnosis
+from sccal.report.diagnosis.figures import candidates, drift_before_after, finding_drawings, residual_picture
+from sccal.report.diagnosis.page import diagnosis_html
+from sccal.report.diagnosis.text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
+from sccal.report.write import write_diagnosis
 from sccal.results.calibration import Estimate, Noise, OutageWindow, Parameters
 from sccal.results.converter import document_of, json_text
 from sccal.results.diagnosis import (
@@ -397,7 +397,7 @@ def test_names_from_outside_cannot_steer_the_terminal() -> None:
 
 def test_the_terminal_report_needs_neither_matplotlib_nor_jinja2() -> None:
     code = (
-        "import sys, sccal.report.diagnosis_text, sccal.report.diagnosis_write; "
+        "import sys, sccal.report.diagnosis.text, sccal.report.write; "
         "print({'matplotlib', 'jinja2'} & set(sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout == "set()\n"

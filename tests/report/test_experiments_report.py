@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from sccal.experiments.plan import EXPERIMENTS, PATHS, judged_s
-from sccal.report.experiments_figures import cell_drawings, convergence, overview_drawing
-from sccal.report.experiments_html import experiments_html
-from sccal.report.experiments_text import answers, experiments_text, headline, ratio_text, spread_text
-from sccal.report.experiments_write import write_experiments
+from sccal.report.experiments.figures import cell_drawings, convergence, overview_drawing
+from sccal.report.experiments.page import experiments_html
+from sccal.report.experiments.text import answers, experiments_text, headline, ratio_text, spread_text
+from sccal.report.write import write_experiments
 from sccal.results.calibration import Estimate, History, Parameters, Trajectory
 from sccal.results.converter import document_of, json_text
 from sccal.results.experiments import (

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 import yaml
 
-from sccal.report.ros2_control import ros2_control_yaml
-from sccal.report.trajectory import trajectory_csv, trajectory_tum
-from sccal.report.write import write_calibration, write_numbers, write_vehicle
+from sccal.report.run.trajectory import trajectory_csv, trajectory_tum
+from sccal.report.write import ros2_control_yaml, write_calibration, write_numbers, write_vehicle
 from sccal.results.calibration import Calibration, Estimate, VehicleCalibration
 from sccal.results.converter import document_of, json_text
 

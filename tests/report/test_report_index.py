@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from sccal.errors import DataError, Failure, SccalError
 from sccal.logs.streams import Notice
-from sccal.report.index_csv import FORMULA_MARKS, summary_csv
-from sccal.report.index_figures import PATH_UNITS, control_chart, path_strokes
-from sccal.report.index_html import index_html
-from sccal.report.index_lines import change_sentence, changes, headline, with_sentences
-from sccal.report.index_write import write_summary
+from sccal.report.fleet.figures import PATH_UNITS, control_chart, path_strokes
+from sccal.report.fleet.lines import change_sentence, changes, headline, with_sentences
+from sccal.report.fleet.page import index_html
+from sccal.report.fleet.table import FORMULA_MARKS, summary_csv
+from sccal.report.write import write_summary
 from sccal.results.calibration import VEHICLE_RUN
 from sccal.results.converter import document_of
 from sccal.results.summary import ThinPath

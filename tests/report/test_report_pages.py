@@ -9,12 +9,13 @@ from xml.etree import ElementTree
 import numpy as np
 
 from sccal.calibration.verdict import run_verdict
-from sccal.report.advice import advice_on
-from sccal.report.figures import thinned
-from sccal.report.figures_outage import outage_plan
-from sccal.report.figures_run import run_drawings
-from sccal.report.html import run_html, vehicle_html
-from sccal.report.plan import drawn
+from sccal.report.drawing.plan import drawn
+from sccal.report.drawing.style import thinned
+from sccal.report.run.advice import advice_on
+from sccal.report.run.figure_outage import outage_plan
+from sccal.report.run.figures import run_drawings
+from sccal.report.run.page import run_html
+from sccal.report.vehicle.page import vehicle_html
 from sccal.results.calibration import (
     Calibration,
     Estimate,

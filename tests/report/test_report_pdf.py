@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sccal.report.pdf import run_pdf, width_of, wrapped
+from sccal.report.run.pdf import run_pdf, width_of, wrapped
 from sccal.report.write import write_calibration
 from sccal.results.calibration import Calibration
 

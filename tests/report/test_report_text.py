@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 from sccal.logs.streams import Notice
-from sccal.report.text import NOTICES_SHOWN, run_text, shortened, vehicle_text
+from sccal.report.layout import NOTICES_SHOWN, shortened
+from sccal.report.run.text import run_text
+from sccal.report.vehicle.text import vehicle_text
 from sccal.results.calibration import Calibration, VehicleCalibration
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -66,5 +68,5 @@ def test_long_names_keep_both_ends() -> None:
 
 
 def test_the_terminal_report_needs_neither_matplotlib_nor_jinja2() -> None:
-    code = "import sys, sccal.report.text, sccal.report.write; print({'matplotlib', 'jinja2'} & set(sys.modules))"
+    code = "import sys, sccal.report.run.text, sccal.report.write; print({'matplotlib', 'jinja2'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout == "set()\n"

@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from sccal.calibration.verdict import judged_run, judged_vehicle, run_verdict, vehicle_verdict
-from sccal.report.html import run_html
-from sccal.report.junit import junit_xml
-from sccal.report.step_summary import step_summary
-from sccal.report.text import run_text, vehicle_text
+from sccal.report.fleet.junit import junit_xml
+from sccal.report.fleet.step_summary import step_summary
+from sccal.report.run.page import run_html
+from sccal.report.run.text import run_text
+from sccal.report.vehicle.text import vehicle_text
 from sccal.results.calibration import Calibration, Missing, Status, VehicleCalibration
 from sccal.results.converter import document_of
 from sccal.results.gates import BatchOutcome

@@ -54,7 +54,7 @@ def test_documents_of_comparisons(a_run, a_vehicle):
 
 
 def test_the_document_of_a_fleet(tmp_path):
-    from sccal.report.index_lines import with_sentences
+    from sccal.report.fleet.lines import with_sentences
     from sccal.summary import summarise
 
     runs = history(12)

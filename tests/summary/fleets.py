@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sccal.arrays import Floats
-from sccal.report.trajectory import CSV_HEADER
+from sccal.report.run.trajectory import CSV_HEADER
 from sccal.results.calibration import CALIBRATION_SCHEMA, VEHICLE_RUN, Calibration, VehicleCalibration
 from sccal.results.converter import document_of, json_text
 from tests.results.documents import retold, saved

@@ -1,0 +1,1 @@
+"""A diagnosis: text, page, figures."""

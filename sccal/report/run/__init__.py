@@ -1,0 +1,1 @@
+"""One run: text, page, PDF, figures, and the files of its path."""

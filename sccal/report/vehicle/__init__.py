@@ -1,0 +1,1 @@
+"""Several runs of one vehicle: text, page, figures."""
