@@ -12,7 +12,7 @@ import pytest
 import sccal.batch
 from sccal.cli.calibrate import calibrate
 from sccal.cli.diagnose import diagnose
-from sccal.cli.reading import READ_OPTIONS
+from sccal.cli.reading import Reading
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import discover, read_run
 from tests.message_logs import messages_of, ros2_bytes, write_mcap
@@ -39,9 +39,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_read_option_is_on_both_commands() -> None:
-    assert list(READ_OPTIONS) == [field.name for field in fields(ReadOptions)]
+    names = [field.name for field in fields(Reading)]
+    assert names == [field.name for field in fields(ReadOptions)]
+    assert Reading().options() == ReadOptions()
     for one in (calibrate, diagnose):
-        assert set(READ_OPTIONS) <= set(inspect.signature(one).parameters)
+        assert set(names) <= set(inspect.signature(one).parameters)
     assert "--left-ticks" in command("diagnose", "--help").out
 
 

@@ -2,92 +2,141 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from contextlib import redirect_stdout
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sccal.cli.app import app
+from sccal.cli.options import grouped
 from sccal.cli.progress import progress_on
-from sccal.cli.reading import PathsOrUrls, local_or_url, with_read_options
+from sccal.cli.reading import PathsOrUrls, Reading, local_or_url
 from sccal.cli.telling import columns, tell_failures
 from sccal.errors import SccalError
 
 if TYPE_CHECKING:
     from sccal.batch import Batch, Progress
     from sccal.batch.tasks import Source
-    from sccal.logs.options import ReadOptions
+    from sccal.calibration.options import CalibrationOptions
+    from sccal.gates.asked import Asked
     from sccal.results.calibration import Calibration
     from sccal.results.gates import BatchOutcome
 
 
-@app.command()
-@with_read_options
-def calibrate(
-    paths: PathsOrUrls,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
+@dataclass(frozen=True)
+class Estimating:
+    """How the parameters are estimated, and the path written."""
+
     no_offset: Annotated[
         bool, typer.Option("--no-offset", help="The paper's SC EKF: no heading-offset state, the AHRS is true.")
-    ] = False,
-    window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0,
-    rate: Annotated[float, typer.Option(help="Rate of the written trajectory, Hz.", min=0.1, max=1000.0)] = 10.0,
-    heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0,
-    radius_prior: Annotated[
-        float, typer.Option(help="Prior sigma of each wheel radius, % of nominal.", min=0.01)
-    ] = 10.0,
+    ] = False
+    window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0
+    rate: Annotated[float, typer.Option(help="Rate of the written trajectory, Hz.", min=0.1, max=1000.0)] = 10.0
+    heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0
+    radius_prior: Annotated[float, typer.Option(help="Prior sigma of each wheel radius, % of nominal.", min=0.01)] = (
+        10.0
+    )
     difference_prior: Annotated[
         float, typer.Option(help="Prior sigma of the radii's difference, % of nominal.", min=0.001)
-    ] = 4.0,
-    track_prior: Annotated[float, typer.Option(help="Prior sigma of the track width, % of nominal.", min=0.01)] = 30.0,
-    radius_walk: Annotated[float, typer.Option(help="Random walk of each radius, ppm per √s.", min=0.0)] = 1.0,
-    track_walk: Annotated[float, typer.Option(help="Random walk of the track, ppm per √s.", min=0.0)] = 3.0,
-    offset_walk: Annotated[float, typer.Option(help="Random walk of the heading offset, deg per √s.", min=0.0)] = 0.002,
-    outlier_gate: Annotated[
-        float, typer.Option(help="Reject measurements further off than this, sigmas.", min=1.0)
-    ] = 5.0,
+    ] = 4.0
+    track_prior: Annotated[float, typer.Option(help="Prior sigma of the track width, % of nominal.", min=0.01)] = 30.0
+    radius_walk: Annotated[float, typer.Option(help="Random walk of each radius, ppm per √s.", min=0.0)] = 1.0
+    track_walk: Annotated[float, typer.Option(help="Random walk of the track, ppm per √s.", min=0.0)] = 3.0
+    offset_walk: Annotated[float, typer.Option(help="Random walk of the heading offset, deg per √s.", min=0.0)] = 0.002
+    outlier_gate: Annotated[float, typer.Option(help="Reject measurements further off than this, sigmas.", min=1.0)] = (
+        5.0
+    )
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """What is estimated beside the model's own parameters, and what it is kept from."""
+
     effects: Annotated[
         str, typer.Option(help="Estimate these effects too, e.g. lever_arm,soft_iron (see `sccal effects`).")
-    ] = "",
+    ] = ""
     model: Annotated[
         Path | None,
         typer.Option(
             help="Estimate the effects of this model.json of `sccal diagnose`, in its shapes and with its noise.",
             show_default=False,
         ),
-    ] = None,
+    ] = None
     withhold: Annotated[
         list[str] | None,
         typer.Option(help="Withhold the fixes from 60 to 120 s, say, and tell how far the robot drifts (repeatable)."),
-    ] = None,
+    ] = None
+
+    def names(self) -> tuple[str, ...]:
+        """Of the effects that are asked for one by one."""
+        return tuple(name.strip() for name in self.effects.split(",") if name.strip())
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is written only where it is asked for."""
+
     mcap: Annotated[
         bool, typer.Option("--mcap", help="Write calibration.mcap too: the results as messages beside the log's.")
-    ] = False,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too: the page on A4.")] = False,
+    ] = False
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write report.pdf too: the page on A4.")] = False
+
+
+@dataclass(frozen=True)
+class Work:
+    """Who does the work, and how much of it."""
+
     jobs: Annotated[
         int | None, typer.Option(help="Runs at a time; by default one on each core.", min=1, show_default=False)
-    ] = None,
+    ] = None
     resume: Annotated[
         bool, typer.Option("--resume", help="Skip runs whose results stand in OUT, from the same inputs and options.")
-    ] = False,
-    scheduler: Annotated[str, typer.Option(help="Work on this Dask cluster instead, tcp://host:8786.")] = "",
+    ] = False
+    scheduler: Annotated[str, typer.Option(help="Work on this Dask cluster instead, tcp://host:8786.")] = ""
+
+
+@dataclass(frozen=True)
+class Checks:
+    """What the results are held to, and where CI reads how that ended."""
+
     gate: Annotated[
         list[str] | None,
         typer.Option(help='Fail with exit code 1 unless, e.g. "outage.percent_of_distance<0.5" (repeatable).'),
-    ] = None,
+    ] = None
     baseline: Annotated[
         Path | None,
         typer.Option(help="Compare with this calibration.json, vehicle.json or summary.json.", show_default=False),
-    ] = None,
+    ] = None
     allow_drift: Annotated[
         list[str] | None,
         typer.Option(help="How far from the baseline: 2sigma, 1%, 0.5mm, 0.2deg (repeatable; 3sigma without it)."),
-    ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML for CI servers.", show_default=False)] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+    ] = None
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML for CI servers.", show_default=False)] = None
+
+    def asked(self, effects: tuple[str, ...]) -> Asked:
+        """As the gates take them, where these effects are estimated."""
+        from sccal.gates.asked import read_asked
+
+        return read_asked(self.gate or [], self.baseline, self.allow_drift or [], effects)
+
+
+@app.command()
+@grouped
+def calibrate(
+    paths: PathsOrUrls,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
     *,
-    read: ReadOptions,
+    estimating: Estimating,
+    beyond: Beyond,
+    files: Files,
+    work: Work,
+    checks: Checks,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+    read: Reading,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
     from sccal.cli.crew import crew_for, one_thread_each
@@ -97,41 +146,15 @@ def calibrate(
     local = [path for path in given if isinstance(path, Path)]
     if len(local) == len(given):
         require_any_log(local)
-    estimated = tuple(name.strip() for name in effects.split(",") if name.strip())
     one_thread_each()
-    crew = crew_for(given, jobs, scheduler)
-    import numpy as np
-
+    crew = crew_for(given, work.jobs, work.scheduler)
     from sccal.batch import AlsoWritten, calibrate_paths, judged, write_outcome
-    from sccal.calibration.judged_model import read_judged_model
-    from sccal.calibration.options import CalibrationOptions
-    from sccal.filter.options import FilterOptions
-    from sccal.gates.asked import read_asked
-    from sccal.logs.windows import parse_window
 
     lines = sys.stderr if as_json else sys.stdout
     try:
-        judged_model = None if model is None else read_judged_model(model)
-        options = CalibrationOptions(
-            filter=FilterOptions(
-                with_offset=not no_offset,
-                radius_prior=radius_prior / 100.0,
-                radius_difference_prior=difference_prior / 100.0,
-                track_prior=track_prior / 100.0,
-                radius_walk=radius_walk * 1e-6,
-                track_walk=track_walk * 1e-6,
-                offset_walk_rad=float(np.radians(offset_walk)),
-                gate_sigmas=outlier_gate,
-            ),
-            outage_window_s=window,
-            output_rate_hz=rate,
-            heading_rate_hz=heading_rate,
-            effects=estimated,
-            model=judged_model,
-            withhold_s=tuple(parse_window(text) for text in withhold or []),
-        )
-        expected = () if judged_model is None else tuple(one.name for one in judged_model.effects)
-        asked = read_asked(gate or [], baseline, allow_drift or [], (*estimated, *expected))
+        options = options_of(estimating, beyond)
+        expected = () if options.model is None else tuple(one.name for one in options.model.effects)
+        asked = checks.asked((*options.effects, *expected))
         with progress_on(lines) as bar, redirect_stdout(lines):
             teller = _Teller(bar)
             batch = calibrate_paths(
@@ -139,16 +162,16 @@ def calibrate(
                 out,
                 options,
                 teller.tell,
-                read,
-                AlsoWritten(mcap=mcap, pdf=pdf),
+                read.options(),
+                AlsoWritten(mcap=files.mcap, pdf=files.pdf),
                 crew=crew,
-                resume=resume,
+                resume=work.resume,
                 progress=teller,
             )
     finally:
         crew.close()
     outcome = judged(batch, asked)
-    index = write_outcome(outcome, out, junit)
+    index = write_outcome(outcome, out, checks.junit)
     with redirect_stdout(lines):
         _tell_batch(batch, out, index)
         _tell_gates(outcome)
@@ -159,6 +182,38 @@ def calibrate(
     with redirect_stdout(lines):
         tell_failures(batch.failures, len(batch.failures) + len(batch.runs))
     raise typer.Exit(int(outcome.exit_code))
+
+
+def options_of(estimating: Estimating, beyond: Beyond) -> CalibrationOptions:
+    """As the calibration takes them: shares instead of percent and ppm, radians instead of degrees.
+
+    Raises:
+        SccalError: the model cannot be read, or a window is none.
+    """
+    from sccal.calibration.judged_model import read_judged_model
+    from sccal.calibration.options import CalibrationOptions
+    from sccal.filter.options import FilterOptions
+    from sccal.logs.windows import parse_window
+
+    model = None if beyond.model is None else read_judged_model(beyond.model)
+    return CalibrationOptions(
+        filter=FilterOptions(
+            with_offset=not estimating.no_offset,
+            radius_prior=estimating.radius_prior / 100.0,
+            radius_difference_prior=estimating.difference_prior / 100.0,
+            track_prior=estimating.track_prior / 100.0,
+            radius_walk=estimating.radius_walk * 1e-6,
+            track_walk=estimating.track_walk * 1e-6,
+            offset_walk_rad=math.radians(estimating.offset_walk),
+            gate_sigmas=estimating.outlier_gate,
+        ),
+        outage_window_s=estimating.window,
+        output_rate_hz=estimating.rate,
+        heading_rate_hz=estimating.heading_rate,
+        effects=beyond.names(),
+        model=model,
+        withhold_s=tuple(parse_window(text) for text in beyond.withhold or []),
+    )
 
 
 class _Teller:

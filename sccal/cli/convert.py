@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.options import grouped
+from sccal.cli.reading import Paths, Reading
 from sccal.cli.telling import tell_failures
 from sccal.errors import SccalError, UsageError
 
 if TYPE_CHECKING:
     from sccal.convert.paths import ConvertedRun
-    from sccal.logs.options import ReadOptions
     from sccal.logs.run import RunSource
 
 
 @app.command()
-@with_read_options
+@grouped
 def convert(
     paths: Paths,
     out: Annotated[
@@ -28,7 +28,7 @@ def convert(
     ],
     to: Annotated[str, typer.Option(help="mcap or folder; without it, MCAP becomes folders and all else MCAP.")] = "",
     *,
-    read: ReadOptions,
+    read: Reading,
 ) -> None:
     """Runs below PATHS from folders or ROS bags into MCAP, or into folders; nothing that is read is lost."""
     from sccal.convert.paths import convert_paths
@@ -36,7 +36,7 @@ def convert(
     forms: dict[str, Literal["mcap", "folder"] | None] = {"": None, "mcap": "mcap", "folder": "folder"}
     if to not in forms:
         raise UsageError(f"--to {to}: must be mcap or folder")
-    converted, failures = convert_paths(paths, out, forms[to], read, _tell_converted)
+    converted, failures = convert_paths(paths, out, forms[to], read.options(), _tell_converted)
     tell_failures(failures, len(failures) + len(converted))
 
 

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.options import grouped
+from sccal.cli.reading import Paths, Reading
 from sccal.cli.telling import columns, tell_failures
-
-if TYPE_CHECKING:
-    from sccal.logs.options import ReadOptions
 
 
 @app.command()
-@with_read_options
+@grouped
 def diagnose(
     paths: Paths,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
     window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0,
     heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0,
     *,
-    read: ReadOptions,
+    read: Reading,
 ) -> None:
     """What the model lacks in the runs below PATHS: name it, add it, and judge before and after on data held out."""
     from sccal.logs.first_look import require_any_log
@@ -35,7 +33,7 @@ def diagnose(
     from sccal.results.files import MODEL_FILE
 
     options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
-    diagnosed, failures = diagnose_paths(paths, out, options, read)
+    diagnosed, failures = diagnose_paths(paths, out, options, read.options())
     width = columns()
     alone = len(diagnosed) == 1
     for diagnosis, page in diagnosed:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.reading import Paths, with_read_options
+from sccal.cli.options import grouped
+from sccal.cli.reading import Paths, Reading
 from sccal.cli.telling import columns, tell_failures
-
-if TYPE_CHECKING:
-    from sccal.logs.options import ReadOptions
 
 
 @app.command("inspect")
-@with_read_options
+@grouped
 def inspect_(
     paths: Paths,
     out: Annotated[
@@ -25,7 +23,7 @@ def inspect_(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
     *,
-    read: ReadOptions,
+    read: Reading,
 ) -> None:
     """What is in the logs below PATHS before anything is estimated, and what their drives can show."""
     from sccal.batch import inspect_paths
@@ -33,7 +31,7 @@ def inspect_(
     from sccal.results.converter import document_of, json_text
     from sccal.results.inspection import InspectFailure, Inspections
 
-    inspected, failures = inspect_paths(paths, out, read)
+    inspected, failures = inspect_paths(paths, out, read.options())
     if as_json:
         failed = tuple(InspectFailure(one.name, str(one.error)) for one in failures)
         print(json_text(document_of(Inspections(tuple(one for one, _ in inspected), failed))), end="")
