@@ -88,7 +88,7 @@ def calibrate(folder: Path, out: Path) -> Calibrated:
 
 def diagnose(folder: Path, out: Path) -> Diagnosed:
     """Diagnose one run in this process and read its diagnosis.json."""
-    from sccal.batch import diagnose_paths
+    from sccal.batch.diagnosing import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
 
     quiet = io.StringIO()

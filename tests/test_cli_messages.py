@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-import sccal.batch
+from sccal.batch import diagnosing
 from sccal.cli.calibrate import calibrate
 from sccal.cli.diagnose import diagnose
 from sccal.cli.reading import Reading
@@ -111,6 +111,6 @@ def test_diagnose_hands_the_options_on(folder: Path, tmp_path: Path, monkeypatch
         seen.append(read)
         return [], []
 
-    monkeypatch.setattr(sccal.batch, "diagnose_paths", note)
+    monkeypatch.setattr(diagnosing, "diagnose_paths", note)
     assert command("diagnose", folder, "--out", tmp_path, "--left-joint", "l", "--time", "log").code == 0
     assert seen == [ReadOptions(left_joint="l", time="log")]

@@ -19,7 +19,7 @@ from sccal.cli.telling import columns, tell_failures
 from sccal.errors import SccalError
 
 if TYPE_CHECKING:
-    from sccal.batch import Batch, Progress
+    from sccal.batch.calibrating import Batch, Progress
     from sccal.batch.tasks import Source
     from sccal.calibration.options import CalibrationOptions
     from sccal.gates.asked import Asked
@@ -148,7 +148,9 @@ def calibrate(
         require_any_log(local)
     one_thread_each()
     crew = crew_for(given, work.jobs, work.scheduler)
-    from sccal.batch import AlsoWritten, calibrate_paths, judged, write_outcome
+    from sccal.batch.calibrating import calibrate_paths
+    from sccal.batch.outcome import judged, write_outcome
+    from sccal.batch.tasks import AlsoWritten
 
     lines = sys.stderr if as_json else sys.stdout
     try:

@@ -27,7 +27,7 @@ def diagnose(
     from sccal.logs.first_look import require_any_log
 
     require_any_log(paths)
-    from sccal.batch import diagnose_paths
+    from sccal.batch.diagnosing import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.report.diagnosis.text import diagnosis_text, next_line
     from sccal.results.files import MODEL_FILE

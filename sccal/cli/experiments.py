@@ -24,7 +24,7 @@ def experiments(
     ] = None,
 ) -> None:
     """The paper's experiments: fixes lost or noised, with and without the heading offset as a state."""
-    from sccal.batch import experiment_on_paths
+    from sccal.batch.experimenting import experiment_on_paths
     from sccal.report.experiments.text import experiments_text
 
     done, page, failures = experiment_on_paths(paths or [], out, seeds, duration, jobs, tell_line)

@@ -26,7 +26,7 @@ def inspect_(
     read: Reading,
 ) -> None:
     """What is in the logs below PATHS before anything is estimated, and what their drives can show."""
-    from sccal.batch import inspect_paths
+    from sccal.batch.inspecting import inspect_paths
     from sccal.report.inspection.text import inspection_text
     from sccal.results.converter import document_of, json_text
     from sccal.results.inspection import InspectFailure, Inspections

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TextIO
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
-    from sccal.batch import Progress
+    from sccal.batch.calibrating import Progress
 
 _FEWEST_RUNS = 2
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from sccal import batch
 from sccal.batch import tasks
+from sccal.batch.calibrating import calibrate_paths
 from sccal.calibration.options import CalibrationOptions
 from sccal.errors import Exit, UsageError
 from tests.calibration.test_single import GIVEN
@@ -18,7 +18,7 @@ OPTIONS = CalibrationOptions(noise=GIVEN)
 
 def run(paths: list[Path], out: Path):
     told = []
-    found = batch.calibrate_paths(paths, out, OPTIONS, lambda source, result: told.append((source.name, result)))
+    found = calibrate_paths(paths, out, OPTIONS, lambda source, result: told.append((source.name, result)))
     return found, told
 
 

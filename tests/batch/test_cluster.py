@@ -12,7 +12,7 @@ import time
 
 import pytest
 
-from sccal.batch import calibrate_paths
+from sccal.batch.calibrating import calibrate_paths
 from sccal.calibration.options import CalibrationOptions
 from sccal.errors import UsageError
 from tests.batch.logs import contents, some_runs

@@ -9,7 +9,7 @@ import uuid
 
 import pytest
 
-from sccal.batch import calibrate_paths
+from sccal.batch.calibrating import calibrate_paths
 from sccal.batch.remote import RemoteRun, fetched, find_sources
 from sccal.calibration.options import CalibrationOptions
 from sccal.errors import UsageError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sccal.align import align
-from sccal.batch import calibrate_paths
+from sccal.batch.calibrating import calibrate_paths
 from sccal.calibration.options import CalibrationOptions
 from sccal.diagnose.diagnose import diagnose
 from sccal.logs.run import discover, read_run

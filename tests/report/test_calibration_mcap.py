@@ -12,7 +12,8 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from sccal.batch import AlsoWritten, calibrate_paths
+from sccal.batch.calibrating import calibrate_paths
+from sccal.batch.tasks import AlsoWritten
 from sccal.calibration.options import CalibrationOptions
 from sccal.calibration.single import calibrate_run
 from sccal.geodesy import TangentPlane
