@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Protocol
 
 from sccal.batch.folder import finished, write_run
-from sccal.batch.processes import Crew, Here
+from sccal.batch.processes import Here, Workers
 from sccal.batch.record import RunRecord
 from sccal.batch.remote import find_sources
 from sccal.batch.tasks import AlsoWritten, CalibrateRun, Done, Source
+from sccal.batch.vehicle_fit import Member, vehicle_of_runs
 from sccal.batch.vehicles import as_file_name, check_out, free_stem, identity_of
-from sccal.batch.whole import Member, vehicle_of_runs
 from sccal.calibration.options import CalibrationOptions
 from sccal.errors import Failure, Interrupted, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
@@ -62,41 +62,41 @@ def calibrate_paths(
     read: ReadOptions | None = None,
     also: AlsoWritten | None = None,
     *,
-    crew: Crew | None = None,
+    workers: Workers | None = None,
     resume: bool = False,
     progress: Progress | None = None,
 ) -> Batch:
     """Calibrate every run below the paths, write what each gives to out/<run>, then the vehicles to out.
 
     ``tell`` is called for each run in order, with its result or with why there is none; ``read`` is for logs of
-    messages. ``crew`` does the work: by default this process. With ``resume``, whole results in out from the same
+    messages. ``workers`` does the work: by default this process. With ``resume``, whole results in out from the same
     inputs, options and versions are not made again.
 
     Raises:
         UsageError: a path does not exist, or out cannot hold results.
         Interrupted: by Ctrl-C; what was done until then is written.
     """
-    crew = crew or Here()
+    workers = workers or Here()
     sources, failures = find_sources(paths)
     batch = Batch(failures=failures)
     if sources:
         check_out(out, [source for source in sources if isinstance(source, RunSource)])
         say_if_compiling()
-        if isinstance(crew, Here):
+        if isinstance(workers, Here):
             begin_loading()
     tasks = [CalibrateRun(source, options, read or ReadOptions(), also or AlsoWritten()) for source in sources]
     runs = _Runs(tasks, out, batch, tell, progress)
     try:
-        runs.work(crew, resume)
-        runs.into_vehicles(crew)
+        runs.work(workers, resume)
+        runs.into_vehicles(workers)
     except KeyboardInterrupt:
-        crew.stop()
+        workers.stop()
         raise Interrupted(
             f"interrupted: {runs.count_done} of {len(tasks)} runs are done and stand in {out}/; "
             "the same command with --resume goes on from there"
         ) from None
     except BaseException:
-        crew.stop()
+        workers.stop()
         raise
     return batch
 
@@ -123,7 +123,7 @@ class _Runs:
         """Where a run's results go."""
         return self.out / self.tasks[place].source.name
 
-    def work(self, crew: Crew, resume: bool) -> None:
+    def work(self, workers: Workers, resume: bool) -> None:
         """All runs, as they come; told in order."""
         standing = {place: finished(self.folder(place)) for place in range(len(self.tasks))} if resume else {}
         keys = {place: record.key for place, record in standing.items() if record is not None}
@@ -131,7 +131,7 @@ class _Runs:
             CalibrateRun(task.source, task.options, task.read, task.also, keys.get(place, ""))
             for place, task in enumerate(self.tasks)
         ]
-        for place, done in crew.each(tasks):
+        for place, done in workers.results(tasks):
             if isinstance(done, Done) and done.unchanged:
                 self.results[place] = standing[place]
                 self.batch.unchanged += 1
@@ -164,7 +164,7 @@ class _Runs:
                 self.tell(source, result.calibration)
             self.told += 1
 
-    def into_vehicles(self, crew: Crew) -> None:
+    def into_vehicles(self, workers: Workers) -> None:
         """The vehicles from their runs, and their files."""
         of_vehicle: dict[tuple[object, ...], list[Member]] = {}
         for task, result in zip(self.tasks, self.results, strict=True):
@@ -175,7 +175,7 @@ class _Runs:
         for members in of_vehicle.values():
             declared = members[0].record.calibration.vehicle.name
             try:
-                vehicle = vehicle_of_runs(members, crew)
+                vehicle = vehicle_of_runs(members, workers)
             except SccalError as error:
                 self.batch.failures.append(Failure(declared, error))
                 continue

@@ -45,7 +45,7 @@ class Cluster:
             self.close()
             raise
 
-    def each(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
+    def results(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
         """As they are done; a task whose worker is lost is begun anew elsewhere."""
         futures = {
             self._client.submit(_done, task, pure=False, retries=RETRIES): place for place, task in enumerate(tasks)

@@ -22,10 +22,10 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 _JOIN_S = 2.0
 
 
-class Crew(Protocol):
+class Workers(Protocol):
     """Who does tasks: functions without arguments that can be pickled, and raise nothing."""
 
-    def each(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
+    def results(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
         """Place and result of each task as they come; an error for one whose process was killed."""
         ...
 
@@ -41,7 +41,7 @@ class Crew(Protocol):
 class Here:
     """Work in this process, one task after the other."""
 
-    def each(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
+    def results(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
         """In order."""
         for place, task in enumerate(tasks):
             yield place, task()
@@ -63,7 +63,7 @@ class Processes:
         for _ in range(count):
             self._idle.append(_Worker())
 
-    def each(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
+    def results(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
         """As they are done. The task that a process was killed with is told; another process takes its place."""
         waiting = deque(enumerate(tasks))
         while waiting or self._busy:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sccal.cli.app import app
+from sccal.cli.messages import columns, tell_failures
 from sccal.cli.options import grouped
 from sccal.cli.progress import progress_on
 from sccal.cli.reading import PathsOrUrls, Reading, local_or_url
-from sccal.cli.telling import columns, tell_failures
 from sccal.errors import SccalError
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def calibrate(
     read: Reading,
 ) -> None:
     """Wheel radii, track width and heading offset of every run below PATHS, and of each vehicle."""
-    from sccal.cli.crew import crew_for, one_thread_each
+    from sccal.cli.workers import one_thread_each, workers_for
     from sccal.logs.first_look import require_any_log
 
     given = [local_or_url(path) for path in paths]
@@ -147,9 +147,9 @@ def calibrate(
     if len(local) == len(given):
         require_any_log(local)
     one_thread_each()
-    crew = crew_for(given, work.jobs, work.scheduler)
+    workers = workers_for(given, work.jobs, work.scheduler)
     from sccal.batch.calibrating import calibrate_paths
-    from sccal.batch.outcome import judged, write_outcome
+    from sccal.batch.gating import judged, write_outcome
     from sccal.batch.tasks import AlsoWritten
 
     lines = sys.stderr if as_json else sys.stdout
@@ -166,12 +166,12 @@ def calibrate(
                 teller.tell,
                 read.options(),
                 AlsoWritten(mcap=files.mcap, pdf=files.pdf),
-                crew=crew,
+                workers=workers,
                 resume=work.resume,
                 progress=teller,
             )
     finally:
-        crew.close()
+        workers.close()
     outcome = judged(batch, asked)
     index = write_outcome(outcome, out, checks.junit)
     with redirect_stdout(lines):

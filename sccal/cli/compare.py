@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.telling import columns
+from sccal.cli.messages import columns
 from sccal.errors import DataError, Exit
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from sccal.cli.app import app
+from sccal.cli.messages import tell_failures
 from sccal.cli.options import grouped
 from sccal.cli.reading import Paths, Reading
-from sccal.cli.telling import tell_failures
 from sccal.errors import SccalError, UsageError
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sccal.cli.app import app
+from sccal.cli.messages import tell_failures
 from sccal.cli.reading import Paths
-from sccal.cli.telling import tell_failures
 from sccal.errors import SccalError
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.telling import columns
+from sccal.cli.messages import columns
 
 
 @app.command()

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from sccal.cli.app import app
-from sccal.cli.telling import columns, tell_failures, tell_line
+from sccal.cli.messages import columns, tell_failures, tell_line
 
 
 @app.command()

@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from sccal.cli.app import app
+from sccal.cli.messages import columns, tell_failures
 from sccal.cli.options import grouped
 from sccal.cli.reading import Paths, Reading
-from sccal.cli.telling import columns, tell_failures
 
 
 @app.command("inspect")

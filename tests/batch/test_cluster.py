@@ -54,10 +54,10 @@ def connected(address: str, workers: int) -> Cluster:
     give_up = time.monotonic() + 60
     while True:
         try:
-            crew = Cluster(address)
-            if len(crew._client.scheduler_info(n_workers=-1)["workers"]) >= workers:
-                return crew
-            crew.close()
+            cluster = Cluster(address)
+            if len(cluster._client.scheduler_info(n_workers=-1)["workers"]) >= workers:
+                return cluster
+            cluster.close()
         except UsageError:
             pass
         assert time.monotonic() < give_up
@@ -70,7 +70,7 @@ def test_a_killed_worker_loses_nothing(scheduler, tmp_path):
     logs = some_runs(tmp_path / "logs", NAMES)
     options = CalibrationOptions(noise=GIVEN)
     calibrate_paths([logs], tmp_path / "here", options, lambda *_: None)
-    crew = connected(address, 2)
+    cluster = connected(address, 2)
     seen = threading.Event()
 
     def kill_one() -> None:
@@ -88,9 +88,11 @@ def test_a_killed_worker_loses_nothing(scheduler, tmp_path):
             seen.set()
 
     try:
-        found = calibrate_paths([logs], tmp_path / "there", options, lambda *_: None, crew=crew, progress=AtFirst())
+        found = calibrate_paths(
+            [logs], tmp_path / "there", options, lambda *_: None, workers=cluster, progress=AtFirst()
+        )
     finally:
-        crew.close()
+        cluster.close()
         seen.set()
         killer.join()
     workers[0].wait(10)

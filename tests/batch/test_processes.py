@@ -32,32 +32,32 @@ class Killed:
 
 
 @pytest.fixture(scope="module")
-def crew():
+def workers():
     processes = Processes(2)
     yield processes
     processes.stop()
 
 
-def test_every_task_is_done_once_whoever_does_it(crew):
+def test_every_task_is_done_once_whoever_does_it(workers):
     tasks = [Square(k) for k in range(20)]
-    assert sorted(crew.each(tasks)) == sorted(Here().each(tasks)) == [(k, k * k) for k in range(20)]
+    assert sorted(workers.results(tasks)) == sorted(Here().results(tasks)) == [(k, k * k) for k in range(20)]
 
 
-def test_a_killed_process_is_told_and_takes_no_other_task_with_it(crew):
+def test_a_killed_process_is_told_and_takes_no_other_task_with_it(workers):
     tasks = [Square(0), Killed(signal.SIGKILL), Square(2), Square(3), Square(4)]
-    found = dict(crew.each(tasks))
+    found = dict(workers.results(tasks))
     error = found.pop(1)
     assert isinstance(error, SccalError)
     assert "SIGKILL" in str(error)
     assert "--jobs" in str(error)
     assert found == {0: 0, 2: 4, 3: 9, 4: 16}
-    assert dict(crew.each([Square(5)])) == {0: 25}
+    assert dict(workers.results([Square(5)])) == {0: 25}
 
 
 def test_nothing_is_left_behind():
-    crew = Processes(2)
-    pids = [worker.process.pid for worker in crew._idle]
-    crew.stop()
+    workers = Processes(2)
+    pids = [worker.process.pid for worker in workers._idle]
+    workers.stop()
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from sccal.batch.processes import ONE_THREAD, Crew, Here, Processes
+from sccal.batch.processes import ONE_THREAD, Here, Processes, Workers
 from sccal.errors import UsageError
 from sccal.logs.formats import MESSAGE_SUFFIXES, RUN_FILES
 from sccal.logs.names import BAG_FILE
@@ -18,7 +18,7 @@ _SHORT_BYTES = 4_000_000
 """Of the files of a run of five minutes or so."""
 
 
-def crew_for(paths: Sequence[Path | str], jobs: int | None, scheduler: str = "") -> Crew:
+def workers_for(paths: Sequence[Path | str], jobs: int | None, scheduler: str = "") -> Workers:
     """This process for one job or one run; else processes, which begin loading at once; or a Dask cluster.
 
     Raises:

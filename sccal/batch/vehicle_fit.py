@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
-from sccal.batch.processes import Crew
+from sccal.batch.processes import Workers
 from sccal.batch.record import RunRecord
 from sccal.batch.remote import fetched
 from sccal.batch.tasks import CalibrateRun, JudgeByOthers, LineariseAgain, one_thread, prepared_again
@@ -26,7 +26,7 @@ class Member:
     record: RunRecord
 
 
-def vehicle_of_runs(members: Sequence[Member], crew: Crew) -> VehicleCalibration:
+def vehicle_of_runs(members: Sequence[Member], workers: Workers) -> VehicleCalibration:
     """One result for all runs of a vehicle, one or more.
 
     Raises:
@@ -39,11 +39,11 @@ def vehicle_of_runs(members: Sequence[Member], crew: Crew) -> VehicleCalibration
     with one_thread():
         if len(likelihoods) < len(members):
             return _with_effects(members)
-        vehicle = combined(runs, members[0].task.options.filter, _joint(members, likelihoods, crew))
-        return replace(vehicle, held_out=_held_out(members, likelihoods, crew))
+        vehicle = combined(runs, members[0].task.options.filter, _joint(members, likelihoods, workers))
+        return replace(vehicle, held_out=_held_out(members, likelihoods, workers))
 
 
-def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], crew: Crew) -> SharedFit:
+def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], workers: Workers) -> SharedFit:
     """The joint answer; runs far off it are linearised again there, until it stays."""
     fit = pooled(likelihoods)
     for _ in range(MAX_ROUNDS - 1):
@@ -55,7 +55,7 @@ def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], crew:
             for place in far
             for task in (members[place].task,)
         ]
-        for number, found in crew.each(tasks):
+        for number, found in workers.results(tasks):
             if isinstance(found, SccalError):
                 raise type(found)(f"{members[far[number]].task.source.name}: {found}")
             likelihoods[far[number]] = found
@@ -65,7 +65,7 @@ def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], crew:
     return fit
 
 
-def _held_out(members: Sequence[Member], likelihoods: Sequence[SharedLikelihood], crew: Crew) -> HeldOut | None:
+def _held_out(members: Sequence[Member], likelihoods: Sequence[SharedLikelihood], workers: Workers) -> HeldOut | None:
     """Every run judged by the others, opened again by whoever does the work."""
     runs = [one.record.calibration for one in members]
     tasks = [
@@ -79,7 +79,7 @@ def _held_out(members: Sequence[Member], likelihoods: Sequence[SharedLikelihood]
         for place, one in enumerate(members)
     ]
     windows: list[tuple[OutageWindow, ...]] = [()] * len(members)
-    for place, found in crew.each(tasks):
+    for place, found in workers.results(tasks):
         if isinstance(found, SccalError):
             raise type(found)(f"{members[place].task.source.name}: {found}")
         windows[place] = found

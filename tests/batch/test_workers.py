@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sccal.batch.processes import Here, Processes
-from sccal.cli import crew
+from sccal.cli import workers
 from sccal.errors import UsageError
 
 
@@ -17,9 +17,9 @@ def counted(monkeypatch):
         def __init__(self, count):
             self.count = count
 
-    monkeypatch.setattr(crew, "Processes", Counted)
-    monkeypatch.setattr(crew, "usable_cores", lambda: 4)
-    return lambda *paths, jobs=None: getattr(crew.crew_for(paths, jobs), "count", 1)
+    monkeypatch.setattr(workers, "Processes", Counted)
+    monkeypatch.setattr(workers, "usable_cores", lambda: 4)
+    return lambda *paths, jobs=None: getattr(workers.workers_for(paths, jobs), "count", 1)
 
 
 def laid(folder, runs, size_bytes=10):
@@ -57,6 +57,6 @@ def test_files_folders_and_urls(tmp_path, counted):
 
 
 def test_a_cluster_has_its_own_workers():
-    assert isinstance(crew.crew_for([], 1), Here)
+    assert isinstance(workers.workers_for([], 1), Here)
     with pytest.raises(UsageError, match="--jobs"):
-        crew.crew_for([], 2, "tcp://nowhere:1")
+        workers.workers_for([], 2, "tcp://nowhere:1")
