@@ -30,5 +30,5 @@ def experiment_on_paths(
     check_out(out, sources)
     say_if_compiling()
     done = run_experiments(seeds, duration_s, sources, jobs, tell)
-    failures += [Failure(one.name, DataError(one.reason)) for one in done.failed]
+    failures += [Failure(failure.name, DataError(failure.reason)) for failure in done.failed]
     return done, write_experiments(done, out), failures

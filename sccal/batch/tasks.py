@@ -202,16 +202,16 @@ def _libraries() -> ThreadpoolController:
 
 def _named(options: Any, prefix: str = "") -> dict[str, str]:
     named: dict[str, str] = {}
-    for one in fields(options):
-        value = getattr(options, one.name)
+    for field in fields(options):
+        value = getattr(options, field.name)
         if isinstance(value, JudgedModel):
-            named[one.name] = digest_of(value)
-        elif is_dataclass(value) and one.name == "filter":
+            named[field.name] = digest_of(value)
+        elif is_dataclass(value) and field.name == "filter":
             named.update(_named(value))
         elif is_dataclass(value):
-            named.update(_named(value, f"{prefix}{one.name}_"))
+            named.update(_named(value, f"{prefix}{field.name}_"))
         else:
-            named[prefix + one.name] = _word(value)
+            named[prefix + field.name] = _word(value)
     return named
 
 

@@ -32,10 +32,10 @@ def vehicle_of_runs(members: Sequence[Member], workers: Workers) -> VehicleCalib
     Raises:
         SccalError: a run has to be opened again and cannot be.
     """
-    runs = [one.record.calibration for one in members]
+    runs = [member.record.calibration for member in members]
     if len(members) == 1:
         return only_run(runs[0])
-    likelihoods = [one.record.likelihood for one in members if one.record.likelihood is not None]
+    likelihoods = [member.record.likelihood for member in members if member.record.likelihood is not None]
     with one_thread():
         if len(likelihoods) < len(members):
             return _with_effects(members)
@@ -67,16 +67,16 @@ def _joint(members: Sequence[Member], likelihoods: list[SharedLikelihood], worke
 
 def _held_out(members: Sequence[Member], likelihoods: Sequence[SharedLikelihood], workers: Workers) -> HeldOut | None:
     """Every run judged by the others, opened again by whoever does the work."""
-    runs = [one.record.calibration for one in members]
+    runs = [member.record.calibration for member in members]
     tasks = [
         JudgeByOthers(
-            one.task.source,
-            one.task.options,
-            one.task.read,
-            one.record.calibration.noise,
+            member.task.source,
+            member.task.options,
+            member.task.read,
+            member.record.calibration.noise,
             SaidByOthers.of(likelihoods, runs, place),
         )
-        for place, one in enumerate(members)
+        for place, member in enumerate(members)
     ]
     windows: list[tuple[OutageWindow, ...]] = [()] * len(members)
     for place, found in workers.results(tasks):
@@ -95,7 +95,7 @@ def _with_effects(members: Sequence[Member]) -> VehicleCalibration:
             noise = one.record.calibration.noise
             problems.append(prepared_again(source, one.task.options, one.task.read, noise))
         options = members[0].task.options
-        vehicle = combine([one.record.calibration for one in members], problems)
+        vehicle = combine([member.record.calibration for member in members], problems)
         model = model_of_vehicle(vehicle, problems, options.heading_rate_hz)
         return replace(
             vehicle,

@@ -155,7 +155,7 @@ def calibrate(
     lines = sys.stderr if as_json else sys.stdout
     try:
         options = options_of(estimating, beyond)
-        expected = () if options.model is None else tuple(one.name for one in options.model.effects)
+        expected = () if options.model is None else tuple(effect.name for effect in options.model.effects)
         asked = checks.asked((*options.effects, *expected))
         with progress_on(lines) as bar, redirect_stdout(lines):
             teller = _Teller(bar)

@@ -29,17 +29,17 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
     parameters = list(_spread(own))
     del with_options.__wrapped__
     with_options.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    with_options.__annotations__ = {one.name: one.annotation for one in parameters}
+    with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return with_options
 
 
 def _spread(signature: inspect.Signature) -> Iterator[inspect.Parameter]:
-    for one in signature.parameters.values():
-        if not is_dataclass(one.annotation):
-            yield one.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+    for parameter in signature.parameters.values():
+        if not is_dataclass(parameter.annotation):
+            yield parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
             continue
-        kinds = get_type_hints(one.annotation, include_extras=True)
-        for field in fields(one.annotation):
+        kinds = get_type_hints(parameter.annotation, include_extras=True)
+        for field in fields(parameter.annotation):
             yield inspect.Parameter(
                 field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=kinds[field.name]
             )

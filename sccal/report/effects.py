@@ -11,7 +11,9 @@ from sccal.effects.effect import Effect
 
 def effects_text(effects: Iterable[Effect], width: int = 100) -> str:
     """One line an effect: name, parameters with units, what it is."""
-    rows = [(effect.name, ", ".join(one.name for one in effect.parameters), effect.title) for effect in effects]
+    rows = [
+        (effect.name, ", ".join(parameter.name for parameter in effect.parameters), effect.title) for effect in effects
+    ]
     names = max(len(name) for name, _, _ in rows)
     parameters = max(len(text) for _, text, _ in rows)
     lines = [f"{name:<{names}}  {text:<{parameters}}  {title}".rstrip() for name, text, title in rows]
@@ -21,11 +23,11 @@ def effects_text(effects: Iterable[Effect], width: int = 100) -> str:
 def effect_text(effect: Effect, width: int = 100) -> str:
     """One effect in full."""
     lines = [f"{effect.name}: {effect.title}", ""]
-    for one in effect.parameters:
-        own = "" if one.left_out is None else f", {one.left_out:g} where not told"
-        kind = f"searched for{own}" if one.shape else f"prior ± {one.prior_sigma:g}"
-        bounds = f"{one.lower:g} … {one.upper:g}"
-        lines.append(f"  {one.name:<12} {one.unit:<14} {kind}, {bounds}, one for each {one.scope}")
+    for parameter in effect.parameters:
+        own = "" if parameter.left_out is None else f", {parameter.left_out:g} where not told"
+        kind = f"searched for{own}" if parameter.shape else f"prior ± {parameter.prior_sigma:g}"
+        bounds = f"{parameter.lower:g} … {parameter.upper:g}"
+        lines.append(f"  {parameter.name:<12} {parameter.unit:<14} {kind}, {bounds}, one for each {parameter.scope}")
     lines.append("")
     for label, text in (
         ("looks like", effect.looks_like),

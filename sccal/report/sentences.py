@@ -75,8 +75,9 @@ def held_out_line(held_out: HeldOut | None, window_s: float) -> str:
 def missing_line(missing: Sequence[Missing]) -> str:
     """What a quick look says that the model lacks; empty where it lacks nothing."""
     parts = [
-        f"{one.effect} (evidence {plain(one.evidence_nats, 3)} nats, {plain(one.size, 2)} times the size that matters)"
-        for one in missing
+        f"{lack.effect} (evidence {plain(lack.evidence_nats, 3)} nats, {plain(lack.size, 2)} times "
+        "the size that matters)"
+        for lack in missing
     ]
     return one_line(f"by a quick look, {', '.join(parts)}; see `sccal diagnose`") if parts else ""
 
@@ -111,7 +112,7 @@ def unseen_line(unseen: Sequence[Unseen]) -> str:
     """Parameters beyond the model that these data do not show; empty where they show all that was asked."""
     if not unseen:
         return ""
-    parts = [f"{one.effect} {one.parameter} below {plain(one.smallest, 2)} {one.unit}" for one in unseen]
+    parts = [f"{item.effect} {item.parameter} below {plain(item.smallest, 2)} {item.unit}" for item in unseen]
     return f"these data would not show {', '.join(parts)}"
 
 

@@ -464,6 +464,8 @@ Calibrated = Calibration | VehicleCalibration
 
 def named_estimates(calibrated: Calibrated) -> dict[str, Estimate]:
     """Every estimate by its dotted name in the file: ``parameters.track_m``, ``effects.lever_arm.left_m``."""
-    return {f"parameters.{key}": one for key, one in calibrated.parameters.by_key.items()} | {
-        f"effects.{effect}.{name}": one for effect, named in calibrated.effects.items() for name, one in named.items()
+    return {f"parameters.{key}": estimate for key, estimate in calibrated.parameters.by_key.items()} | {
+        f"effects.{effect}.{name}": estimate
+        for effect, named in calibrated.effects.items()
+        for name, estimate in named.items()
     }

@@ -98,9 +98,9 @@ class Comparison:
     def changed(self) -> tuple[str, ...]:
         """Names of what changed: parameters beyond their uncertainty, findings gained and lost."""
         found = tuple(one.effect for one in self.effects if one.change != "kept")
-        return found + tuple(one.name for one in self.pairs if one.change == "changed")
+        return found + tuple(pair.name for pair in self.pairs if pair.change == "changed")
 
     @property
     def comparable(self) -> bool:
         """Whether anything could be compared."""
-        return self.kind == "diagnosis" or any(one.change != "not comparable" for one in self.pairs)
+        return self.kind == "diagnosis" or any(pair.change != "not comparable" for pair in self.pairs)

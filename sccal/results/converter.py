@@ -81,7 +81,9 @@ class Entry:
 @cache
 def entries_of(kind: type) -> tuple[Entry, ...]:
     """The keys of a type's documents, in order."""
-    layout = WRITTEN_OF_LOGS.get(kind) or getattr(kind, "WRITTEN", None) or " ".join(one.name for one in fields(kind))
+    layout = (
+        WRITTEN_OF_LOGS.get(kind) or getattr(kind, "WRITTEN", None) or " ".join(field.name for field in fields(kind))
+    )
     return _entries(kind, layout)
 
 
@@ -94,13 +96,13 @@ def _entry(kind: type, key: str, star: str, name: str, parts: str, needed: str) 
     for one in name.split(".") if name else ():
         hint = _type_of(part_of(hint), one) if hint is kind else _or_none(_type_of(part_of(hint), one))
     inner = _entries(kind if not name else part_of(hint), parts[1:-1]) if parts else ()
-    is_field = name in {one.name for one in fields(kind)}
+    is_field = name in {field.name for field in fields(kind)}
     return Entry("" if star else key.rstrip("=") or name_in_files(name), name, hint, is_field, bool(needed), inner)
 
 
 def part_of(hint: Any) -> Any:
     """The type of the blocks in a list, by name or where there may be none."""
-    args = [one for one in get_args(hint) if one not in (type(None), ...)]
+    args = [part for part in get_args(hint) if part not in (type(None), ...)]
     return part_of(args[-1]) if args and get_origin(hint) is not Literal else hint
 
 
@@ -110,7 +112,7 @@ def _or_none(hint: Any) -> Any:
 
 def _type_of(kind: type, name: str) -> Any:
     """Of a field, a property or a method."""
-    if name in {one.name for one in fields(kind)}:
+    if name in {field.name for field in fields(kind)}:
         return get_type_hints(kind)[name]
     attribute = getattr(kind, name)
     function = getattr(attribute, "fget", attribute)
@@ -171,7 +173,7 @@ def not_told(kind: Any) -> Any:
     if kind in _NOTHING:
         return _NOTHING[kind]
     hints = get_type_hints(kind)
-    return kind(**{one.name: not_told(hints[one.name]) for one in fields(kind) if not _has_default(one)})
+    return kind(**{field.name: not_told(hints[field.name]) for field in fields(kind) if not _has_default(field)})
 
 
 def _has_default(field: Any) -> bool:
@@ -196,12 +198,12 @@ def _writer_of(kind: type) -> Callable[[Any], Json]:
 
 def _written(result: Any, entries: tuple[Entry, ...]) -> Json:
     document: Json = {}
-    for one in entries:
+    for entry in entries:
         value = result
-        for name in one.name.split(".") if one.name else ():
+        for name in entry.name.split(".") if entry.name else ():
             value = None if value is None else getattr(value, name)
-        told = _in_part(value, one.parts) if one.parts else _whole(value, one)
-        document |= {one.key: told} if one.key else told
+        told = _in_part(value, entry.parts) if entry.parts else _whole(value, entry)
+        document |= {entry.key: told} if entry.key else told
     return document
 
 
@@ -211,7 +213,7 @@ def _whole(value: Any, entry: Entry) -> Any:
 
 def _in_part(value: Any, parts: tuple[Entry, ...]) -> Any:
     if isinstance(value, Mapping):
-        return {_text(name): _in_part(one, parts) for name, one in value.items()}
+        return {_text(name): _in_part(part, parts) for name, part in value.items()}
     if isinstance(value, tuple):
         return [_in_part(one, parts) for one in value]
     return None if value is None else _written(value, parts)
@@ -248,15 +250,15 @@ def _part(block: Mapping[str, Any], key: str, kind: Any) -> Any:
 def _found(block: Mapping[str, Any], entries: tuple[Entry, ...]) -> dict[str, Any]:
     """The fields that a block tells."""
     found: dict[str, Any] = {}
-    for one in entries:
-        if not one.name and block.get(one.key) is not None:
-            with _at(one.key):
-                found |= _found(_block(block[one.key]), one.parts)
-        elif one.is_field and not one.key:
-            found[one.name] = _converter().structure(block, one.kind)
-        elif one.is_field and (one.needed or block.get(one.key) is not None):
-            value = _part(block, one.key, one.kind)
-            found[one.name] = _in_radians(value) if one.is_angle else value
+    for entry in entries:
+        if not entry.name and block.get(entry.key) is not None:
+            with _at(entry.key):
+                found |= _found(_block(block[entry.key]), entry.parts)
+        elif entry.is_field and not entry.key:
+            found[entry.name] = _converter().structure(block, entry.kind)
+        elif entry.is_field and (entry.needed or block.get(entry.key) is not None):
+            value = _part(block, entry.key, entry.kind)
+            found[entry.name] = _in_radians(value) if entry.is_angle else value
     return found
 
 
@@ -352,7 +354,7 @@ def _read_names(value: Any, kind: Any) -> dict[Any, Any]:
 
 
 def _read_optional(value: Any, kind: Any) -> Any:
-    (of,) = (one for one in get_args(kind) if one is not type(None))
+    (of,) = (part for part in get_args(kind) if part is not type(None))
     return None if value is None else _converter().structure(value, of)
 
 
@@ -375,9 +377,9 @@ def _converter() -> cattrs.Converter:
     converter.register_unstructure_hook(np.float64, lambda value: float(value) if math.isfinite(value) else None)
     converter.register_unstructure_hook(np.ndarray, lambda values: converter.unstructure(values.tolist()))
     for listed in (tuple, list):
-        converter.register_unstructure_hook(listed, lambda values: [converter.unstructure(one) for one in values])
+        converter.register_unstructure_hook(listed, lambda values: [converter.unstructure(value) for value in values])
     converter.register_unstructure_hook(
-        dict, lambda named: {_text(str(key)): converter.unstructure(one) for key, one in named.items()}
+        dict, lambda named: {_text(str(key)): converter.unstructure(value) for key, value in named.items()}
     )
     converter.register_unstructure_hook(Vehicle, lambda vehicle: _text(vehicle.name))
     converter.register_unstructure_hook(Verdict, lambda verdict: _text(str(verdict)))

@@ -68,7 +68,7 @@ class Trial:
 
     def of(self, variant: Variant) -> Filtered:
         """One variant's part."""
-        return next(one for one in self.filtered if one.variant == variant)
+        return next(run for run in self.filtered if run.variant == variant)
 
 
 @dataclass(frozen=True)

@@ -64,8 +64,8 @@ class BatchOutcome:
     def no_results(self) -> tuple[NoResult, ...]:
         """The failures in the words of a file."""
         return tuple(
-            NoResult(one.name, type(one.error).__name__, int(one.error.exit_code), str(one.error))
-            for one in self.failures
+            NoResult(failure.name, type(failure.error).__name__, int(failure.error.exit_code), str(failure.error))
+            for failure in self.failures
         )
 
     @property

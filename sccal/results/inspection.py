@@ -330,7 +330,7 @@ class Inspection:
     @property
     def refused(self) -> bool:
         """Whether a calibration of this log is impossible."""
-        return any(one.weight == "refused" for one in self.findings)
+        return any(finding.weight == "refused" for finding in self.findings)
 
     @property
     def calibratable(self) -> bool:
@@ -363,7 +363,7 @@ class Inspection:
     @property
     def streams_by_name(self) -> Mapping[str, StreamFacts]:
         """The streams by what they are."""
-        return {one.name: one for one in self.streams}
+        return {stream.name: stream for stream in self.streams}
 
     @property
     def standstill_told(self) -> StandstillTold | None:

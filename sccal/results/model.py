@@ -51,7 +51,7 @@ class Shape:
 
 def measured(parameters: Mapping[str, Estimate], units: Mapping[str, str]) -> dict[str, Measured]:
     """Parameters with their units."""
-    return {name: Measured(**vars(one), unit=units.get(name, "")) for name, one in parameters.items()}
+    return {name: Measured(**vars(estimate), unit=units.get(name, "")) for name, estimate in parameters.items()}
 
 
 def unmeasured(found: Mapping[str, Measured]) -> tuple[dict[str, Estimate], dict[str, str]]:

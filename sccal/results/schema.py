@@ -60,7 +60,7 @@ def _of(kind: Any, blocks: dict[str, Json]) -> Json:
     if origin is Literal:
         return {"enum": list(args)}
     if origin in (Union, UnionType):
-        return {"anyOf": [_of(one, blocks) for one in args]}
+        return {"anyOf": [_of(part, blocks) for part in args]}
     if origin is np.ndarray:
         return {"type": "array"}
     if origin is tuple:
@@ -78,7 +78,7 @@ def _of(kind: Any, blocks: dict[str, Json]) -> Json:
 def _list(args: tuple[Any, ...], blocks: dict[str, Json]) -> Json:
     if args[1:] == (...,):
         return {"type": "array", "items": _of(args[0], blocks)}
-    return {"type": "array", "prefixItems": [_of(one, blocks) for one in args], "minItems": len(args)}
+    return {"type": "array", "prefixItems": [_of(part, blocks) for part in args], "minItems": len(args)}
 
 
 def _block(kind: type, blocks: dict[str, Json]) -> Json:
@@ -90,11 +90,11 @@ def _block(kind: type, blocks: dict[str, Json]) -> Json:
 
 def _parts(entries: tuple[Entry, ...], blocks: dict[str, Json]) -> Json:
     known: Json = {}
-    for one in entries:
-        if not one.key:
-            known |= _parts(entries_of(one.kind), blocks)
+    for entry in entries:
+        if not entry.key:
+            known |= _parts(entries_of(entry.kind), blocks)
         else:
-            known[one.key] = _in_part(one.kind, one.parts, blocks) if one.parts else _of(one.kind, blocks)
+            known[entry.key] = _in_part(entry.kind, entry.parts, blocks) if entry.parts else _of(entry.kind, blocks)
     return known
 
 

@@ -39,14 +39,14 @@ def compare_text(c: Comparison, width: int = 100) -> str:
 
 def headline(c: Comparison) -> str:
     """What changed, in one sentence."""
-    of_effects = [f"{one.effect} {one.change}" for one in c.effects if one.change != "kept"]
-    of_pairs = [_label(one.name) for one in c.pairs if one.change == "changed"]
-    compared = sum(one.change != "not comparable" for one in c.pairs)
+    of_effects = [f"{effect.effect} {effect.change}" for effect in c.effects if effect.change != "kept"]
+    of_pairs = [_label(pair.name) for pair in c.pairs if pair.change == "changed"]
+    compared = sum(pair.change != "not comparable" for pair in c.pairs)
     if compared:
         beyond = f"{len(of_pairs)} of {compared} parameters changed by more than {short(c.sigmas)} sigma"
     else:
         beyond = "no parameter could be compared"
-    named = f": {', '.join(_without_unit(one) for one in of_pairs)}" if of_pairs else ""
+    named = f": {', '.join(_without_unit(pair) for pair in of_pairs)}" if of_pairs else ""
     findings = f"findings: {', '.join(of_effects)}" if of_effects else "the same findings"
     return one_line(f"{findings}; {beyond}{named}" if c.kind == "diagnosis" else f"{beyond}{named}")
 
@@ -60,7 +60,7 @@ def _effects(effects: Sequence[FoundEffect], width: int) -> list[str]:
     if not effects:
         return []
     header = ("effect", "nats A", "nats B", "")
-    rows = [(one_line(one.effect), _nats(one.nats_a), _nats(one.nats_b), one.change) for one in effects]
+    rows = [(one_line(effect.effect), _nats(effect.nats_a), _nats(effect.nats_b), effect.change) for effect in effects]
     lines = in_columns([header, *rows], "<>><")
     for one in effects:
         if one.reason:
@@ -72,14 +72,14 @@ def _pairs(pairs: Sequence[Pair], width: int) -> list[str]:
     header = ("parameter", "A", "B", "B - A", "sigmas", "")
     rows = [
         (
-            _label(one.name),
-            _estimate(one.a, _scale(one.name)),
-            _estimate(one.b, _scale(one.name)),
-            _difference(one),
-            NONE if one.difference is None else _sigmas(one.difference.in_sigmas),
-            NONE if one.difference is None else one.change,
+            _label(pair.name),
+            _estimate(pair.a, _scale(pair.name)),
+            _estimate(pair.b, _scale(pair.name)),
+            _difference(pair),
+            NONE if pair.difference is None else _sigmas(pair.difference.in_sigmas),
+            NONE if pair.difference is None else pair.change,
         )
-        for one in pairs
+        for pair in pairs
     ]
     lines = in_columns([header, *rows], "<>>>><") if rows else []
     for one in pairs:
@@ -89,8 +89,8 @@ def _pairs(pairs: Sequence[Pair], width: int) -> list[str]:
 
 
 def _figures(figures: Sequence[Figure]) -> list[str]:
-    told = [one for one in figures if one.a is not None or one.b is not None]
-    rows = [(one.name, plain(one.a), plain(one.b), _ratio(one)) for one in told]
+    told = [figure for figure in figures if figure.a is not None or figure.b is not None]
+    rows = [(figure.name, plain(figure.a), plain(figure.b), _ratio(figure)) for figure in told]
     return in_columns([("figure", "A", "B", "B / A"), *rows], "<>>>") if rows else []
 
 

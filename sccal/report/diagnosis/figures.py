@@ -174,15 +174,15 @@ def drift_before_after(before: Judgement, after: Judgement | None) -> str:
 def candidates(finding: Finding, needed_nats: float) -> str:
     """Horizontal bars, best first, each below its name; the chosen one is always among them."""
     shown = list(finding.ranking[:RANKED_SHOWN])
-    if not any(one.name == finding.name for one in shown):
-        shown = [*shown[: RANKED_SHOWN - 1], *(one for one in finding.ranking if one.name == finding.name)]
-    gains = [one.evidence_nats if math.isfinite(one.evidence_nats) else 0.0 for one in shown]
+    if not any(ranked.name == finding.name for ranked in shown):
+        shown = [*shown[: RANKED_SHOWN - 1], *(ranked for ranked in finding.ranking if ranked.name == finding.name)]
+    gains = [ranked.evidence_nats if math.isfinite(ranked.evidence_nats) else 0.0 for ranked in shown]
     with styled("candidates"):
         height = 0.6 + 0.46 * len(shown)
         figure = Figure(figsize=(_NARROW_IN, height))
         axes = figure.add_axes((0.03, 0.45 / height, 0.94, 1.0 - 0.5 / height))
         places = np.arange(len(shown))
-        axes.barh(places, gains, height=0.34, color=[_colour(one, finding.name) for one in shown], zorder=2)
+        axes.barh(places, gains, height=0.34, color=[_colour(ranked, finding.name) for ranked in shown], zorder=2)
         span = max(*gains, 0.0) - min(*gains, 0.0) or 1.0
         if math.isfinite(needed_nats) and 0.0 < needed_nats < 1.2 * span:
             axes.axvline(needed_nats, color=VERMILION, lw=1.0, ls=(0, (4, 3)), zorder=1)

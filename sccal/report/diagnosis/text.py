@@ -77,7 +77,7 @@ def verdict_sentence(d: Diagnosis) -> str:
 
 def cause_clause(finding: Finding) -> str:
     """What the machine does: "the antenna sits 0.74 m to the right of the track centre"."""
-    found = {name: one for name, one in finding.parameters.items() if math.isfinite(one.value)}
+    found = {name: estimate for name, estimate in finding.parameters.items() if math.isfinite(estimate.value)}
     where, tilde, column = finding.name.partition("~")
     said = _column_says(where, column, found) if tilde else _effect_says(finding.name, found)
     return one_line(said) if said else _generic(finding)
@@ -85,7 +85,7 @@ def cause_clause(finding: Finding) -> str:
 
 def brings_clause(d: Diagnosis) -> str:
     """What the findings bring where nothing was fitted."""
-    if all(one.aligned for one in d.findings):
+    if all(finding.aligned for finding in d.findings):
         return f"the stamps were put right before the fit, which lacks nothing else; {_drift_now(d.before)}"
     with_it = {1: "it", 2: "both"}.get(len(d.findings), "all of them")
     return f"with {with_it} {change_clause(d.before, d.after)}, {judged_by(d)}"
@@ -131,22 +131,22 @@ def unexplained_sentence(left: Unexplained) -> str:
 def inseparable_lines(d: Diagnosis) -> list[str]:
     """Effects that look the same on this drive."""
     return [
-        " and ".join(one_line(name) for name in one.names) + (f": {one_line(one.advice)}" if one.advice else "")
-        for one in d.inseparable
+        " and ".join(one_line(name) for name in group.names) + (f": {one_line(group.advice)}" if group.advice else "")
+        for group in d.inseparable
     ]
 
 
 def unseen_lines(d: Diagnosis) -> list[str]:
     """What this drive could not show, by what to drive."""
     by_advice: dict[str, list[str]] = {}
-    for one in d.not_excited:
-        by_advice.setdefault(one_line(one.advice), []).append(one_line(one.name))
+    for quantity in d.not_excited:
+        by_advice.setdefault(one_line(quantity.advice), []).append(one_line(quantity.name))
     return [f"{', '.join(names)}: {advice}" if advice else ", ".join(names) for advice, names in by_advice.items()]
 
 
 def detectable_line(detectable: Iterable[Detectable]) -> str:
     """The smallest effects that would have been found."""
-    return "; ".join(f"{one_line(one.name)} {smallest_text(one)}" for one in detectable)
+    return "; ".join(f"{one_line(least.name)} {smallest_text(least)}" for least in detectable)
 
 
 def smallest_text(one: Detectable) -> str:
@@ -174,7 +174,7 @@ def noise_line(noises: Sequence[RunNoise]) -> str:
     """The noise that is left with the findings in the model, over all runs."""
     if not noises:
         return ""
-    all_of = [one.noise for one in noises]
+    all_of = [run.noise for run in noises]
     degrees = math.degrees
     heading = _spread([degrees(n.heading_white_rad) for n in all_of], "deg")
     coloured = _spread([degrees(n.heading_coloured_rad) for n in all_of], "deg")
@@ -199,7 +199,7 @@ def next_line(d: Diagnosis, runs: Sequence[str], model: str) -> str:
     where = shlex.join(runs) if runs else "…"
     if not d.model.effects:
         return f"next: sccal calibrate {where} (the model lacks nothing that these data show)"
-    small = sum(not one.told for one in d.model.effects)
+    small = sum(not effect.told for effect in d.model.effects)
     held = f" (the model holds {_count(small, 'effect')} that is no finding above)" if small else ""
     return f"next: sccal calibrate {where} --model {shlex.quote(model)}{held}"
 
@@ -232,9 +232,9 @@ def finding_rows(finding: Finding) -> tuple[Row, ...]:
 
 def title_of(name: str, d: Diagnosis) -> str:
     """What an effect is, in a few words; its name where nothing says more."""
-    titles = {one.name: one.title for one in d.not_excited}
-    titles |= {one.name: one.title for one in d.detectable}
-    titles |= {one.name: one.title for f in d.findings for one in f.ranking}
+    titles = {quantity.name: quantity.title for quantity in d.not_excited}
+    titles |= {least.name: least.title for least in d.detectable}
+    titles |= {ranked.name: ranked.title for f in d.findings for ranked in f.ranking}
     titles |= {f.name: f.title for f in d.findings}
     return titles.get(name) or (CATALOGUE[name].title if name in CATALOGUE else name)
 
@@ -347,7 +347,9 @@ def _generic(finding: Finding) -> str:
 def _effect_says(name: str, found: Mapping[str, Estimate]) -> str:
     """Empty where it says no more than its title, or where a value that it needs is missing."""
     effect = CATALOGUE.get(name)
-    if effect is None or any(one.default is None and one.name not in found for one in effect.parameters):
+    if effect is None or any(
+        parameter.default is None and parameter.name not in found for parameter in effect.parameters
+    ):
         return ""
     said = effect.says(found)
     return "" if said == effect.title else said

@@ -252,7 +252,7 @@ def labels(values: Floats) -> list[str]:
 
 def limits(values: Sequence[Floats], margin: float = 0.08) -> tuple[float, float]:
     """Room for every finite value."""
-    every = np.concatenate([np.ravel(one) for one in values]) if values else np.empty(0)
+    every = np.concatenate([np.ravel(value) for value in values]) if values else np.empty(0)
     every = every[np.isfinite(every)]
     if not every.size:
         return 0.0, 1.0

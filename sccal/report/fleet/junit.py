@@ -32,10 +32,10 @@ def junit_xml(outcome: BatchOutcome, seconds: Mapping[str, float] | None = None)
         _suite(root, _free(run.run, names), _run_cases(run, of_run), (seconds or {}).get(run.run, 0.0))
     for failure in outcome.failures:
         _suite(root, _free(failure.name, names), [("calibrate", _error(failure))], (seconds or {}).get(failure.name, 0))
-    for one in outcome.vehicles.values():
-        of_vehicle = [gate for gate in outcome.gates if (gate.run, gate.vehicle) == (one.run, one.vehicle.name)]
+    for vehicle in outcome.vehicles.values():
+        of_vehicle = [gate for gate in outcome.gates if (gate.run, gate.vehicle) == (vehicle.run, vehicle.vehicle.name)]
         if of_vehicle:
-            _suite(root, _free(f"{one.run} {one.vehicle.name}", names), _gate_cases(of_vehicle), 0.0)
+            _suite(root, _free(f"{vehicle.run} {vehicle.vehicle.name}", names), _gate_cases(of_vehicle), 0.0)
     for count in ("tests", "failures", "errors"):
         root.set(count, str(sum(int(suite.get(count, "0")) for suite in root)))
     root.set("time", f"{sum(float(suite.get('time', '0')) for suite in root):.3f}")

@@ -126,7 +126,7 @@ def index_html(summary: Summary) -> str:
             "started",
             "duration",
             "distance (m)",
-            *(f"{one.name} ({one.unit})" if one.unit else one.name for one in columns),
+            *(f"{column.name} ({column.unit})" if column.unit else column.name for column in columns),
             "drift without fixes (m)",
             "drift (%)",
         ],
@@ -135,7 +135,7 @@ def index_html(summary: Summary) -> str:
         window=_window(summary.runs),
         paths=[_small(run) for run in summary.runs[:MOST_PATHS] if len(run.path.east_m) > 1],
         paths_left=max(len(summary.runs) - MOST_PATHS, 0),
-        failures=[(one_line(one.run), one_line(one.reason), one.exit_code) for one in summary.failures],
+        failures=[(one_line(failure.run), one_line(failure.reason), failure.exit_code) for failure in summary.failures],
         versions=versions_line(summary.runs),
         version=__version__,
     )  # fmt: skip
@@ -149,7 +149,9 @@ def _columns(summary: Summary) -> list[Shown]:
 
 
 def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow:
-    effects = {f"{effect}.{name}": one for effect, named in run.effects.items() for name, one in named.items()}
+    effects = {
+        f"{effect}.{name}": estimate for effect, named in run.effects.items() for name, estimate in named.items()
+    }
     estimates = {**run.parameters, **effects}
     return TableRow(
         name=one_line(run.run),
@@ -159,7 +161,7 @@ def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow
             Cell(day(run.started), run.started or ""),
             Cell(duration(run.duration_s), _key(run.duration_s)),
             Cell(plain(run.distance_m), _key(run.distance_m)),
-            *(_estimate(one, estimates.get(one.key)) for one in columns),
+            *(_estimate(column, estimates.get(column.key)) for column in columns),
             Cell("–" if run.outage.end_rms_m is None else plain(run.outage.end_rms_m, 2), _key(run.outage.end_rms_m)),
             Cell(
                 "–" if run.outage.percent_of_distance is None else plain(run.outage.percent_of_distance, 2),

@@ -44,7 +44,7 @@ def step_summary(outcome: BatchOutcome) -> str:
     """Markdown: what failed, every run, what the model lacks in them, then the gates that were skipped."""
     lines = [f"### sccal: {_headline(outcome)}", ""]
     if outcome.failures:
-        lines += _table(("no result", "why"), ((one.name, str(one.error)) for one in outcome.failures))
+        lines += _table(("no result", "why"), ((failure.name, str(failure.error)) for failure in outcome.failures))
     lines += _gates(outcome, "failed")
     if outcome.runs:
         header = ("run", "verdict", "R_right mm", "R_left mm", "track mm", "offset deg", "drift %")
@@ -58,11 +58,15 @@ def step_summary(outcome: BatchOutcome) -> str:
 def _gates(outcome: BatchOutcome, which: Outcome) -> Iterator[str]:
     told = [gate for gate in outcome.gates if gate.outcome == which]
     if told:
-        yield from _table((f"gate {which}", "of"), ((gate_line(one), whose(one)) for one in told))
+        yield from _table((f"gate {which}", "of"), ((gate_line(gate), whose(gate)) for gate in told))
 
 
 def _lacking(runs: Sequence[Calibration]) -> Iterator[str]:
-    rows = [(run.run, ", ".join(f"{one.effect}: {one.title}" for one in run.missing)) for run in runs if run.missing]
+    rows = [
+        (run.run, ", ".join(f"{effect.effect}: {effect.title}" for effect in run.missing))
+        for run in runs
+        if run.missing
+    ]
     if rows:
         yield from _table(("run", "sccal diagnose would name"), rows)
 
@@ -89,7 +93,7 @@ def _row(result: Calibrated) -> tuple[str, ...]:
     return (
         f"vehicle {result.vehicle.name}" if result.of_vehicle else result.run,
         f"{_MEANS[level]} {level}",
-        *(_value(one, 1e3 if key.endswith("_m") else 1.0) for key, one in result.parameters.by_key.items()),
+        *(_value(estimate, 1e3 if key.endswith("_m") else 1.0) for key, estimate in result.parameters.by_key.items()),
         MISSING if percent is None else plain(percent, 2),
     )
 

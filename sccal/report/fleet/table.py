@@ -71,7 +71,7 @@ def _failed(failed: FailedRun, columns: int) -> list[Cell]:
 
 
 def _effects(run: RunLine) -> dict[str, Estimate]:
-    return {f"{effect}.{name}": one for effect, named in run.effects.items() for name, one in named.items()}
+    return {f"{effect}.{name}": estimate for effect, named in run.effects.items() for name, estimate in named.items()}
 
 
 def _cell(cell: Cell) -> str:

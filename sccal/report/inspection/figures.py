@@ -77,7 +77,7 @@ def timeline(i: Inspection) -> str:
     curves = [
         (title, drawn)
         for title, every in (("speed (m/s)", speeds), ("turning (deg/s), to the left positive", turns))
-        if (drawn := [one for one in every if np.isfinite(one[1]).any()])
+        if (drawn := [column for column in every if np.isfinite(column[1]).any()])
     ]
     start, end = i.span_s
     with styled("timeline"):
@@ -157,7 +157,7 @@ def _bars(axes: Axes, i: Inspection) -> None:
             axes.broken_barh(
                 [(a, b - a) for a, b in time.tolist()], (len(names) - 0.5 * _BAR, _BAR), color=_colour(code), lw=0
             )
-        shown = sorted({one.code for one in i.fixes.qualities})
+        shown = sorted({quality.code for quality in i.fixes.qualities})
         handles = [Patch(color=colour, label=label) for _, label, colour in by_quality(np.array(shown))]
         axes.legend(
             handles=handles, loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=5, borderaxespad=0.0, borderpad=0.1
@@ -176,7 +176,7 @@ def _quality_pieces(i: Inspection) -> list[tuple[float, float, int]]:
     fixes = i.fixes
     assert fixes is not None
     start, end = i.span_s
-    own = next((one for one in i.streams if one.name == "fixes"), None)
+    own = next((stream for stream in i.streams if stream.name == "fixes"), None)
     shift = _shift(own, start)
     if len(fixes.spans) <= SPANS_SHOWN:
         return [(s.start_s + shift, s.end_s + shift, s.code) for s in fixes.spans if s.code is not None]

@@ -32,9 +32,10 @@ def fixes_lines(f: FixFacts | None) -> tuple[str, ...]:
     """Qualities with their time, then what the receiver states."""
     if f is None:
         return ()
-    total = sum(one.seconds for one in f.qualities) or 1.0
+    total = sum(quality.seconds for quality in f.qualities) or 1.0
     shares = ", ".join(
-        f"{one.name} {plain(100.0 * one.seconds / total, 3)} % ({_brief(one.seconds)})" for one in f.qualities
+        f"{quality.name} {plain(100.0 * quality.seconds / total, 3)} % ({_brief(quality.seconds)})"
+        for quality in f.qualities
     )
     stated = "no sigmas stated"
     if f.stated_sigma_m is not None:
@@ -47,7 +48,7 @@ def fixes_lines(f: FixFacts | None) -> tuple[str, ...]:
         "" if f.hdop is None else f"HDOP {_range(f.hdop)}",
         "" if f.age_s is None else f"corrections {_range(f.age_s, 's')} old",
     ]
-    return shares, ", ".join(one for one in further if one)
+    return shares, ", ".join(column for column in further if column)
 
 
 def clock_text(i: Inspection) -> str:
@@ -94,7 +95,7 @@ def standstill_line(s: StandstillFacts | None) -> str:
         if s.gyro_radps is None or s.gyro_bias_radps is None
         else f"gyro by {plain(math.degrees(s.gyro_radps), 2)} deg/s about {plain(math.degrees(s.gyro_bias_radps), 2)}",
     ]
-    told = ", ".join(one for one in parts if one) or "nothing else was read"
+    told = ", ".join(part for part in parts if part) or "nothing else was read"
     return f"in {_count(s.stops, 'stop')}, {duration(s.seconds)} in all: {told}"
 
 
@@ -123,10 +124,10 @@ def course_line(c: CourseFacts | None) -> str:
 def column_lines(columns: Sequence[ColumnFacts]) -> tuple[str, ...]:
     """Further columns with their range."""
     lines = [
-        f"{one_line(one.name)} ({one.source}) {_range(one.values)}"
-        + ("" if one.varies else ", constant")
-        + (f", {plain(100.0 * one.missing, 2)} % empty" if one.missing > 0.0 else "")
-        for one in columns
+        f"{one_line(column.name)} ({column.source}) {_range(column.values)}"
+        + ("" if column.varies else ", constant")
+        + (f", {plain(100.0 * column.missing, 2)} % empty" if column.missing > 0.0 else "")
+        for column in columns
     ]
     more = len(lines) - COLUMNS_TOLD
     return (*lines[:COLUMNS_TOLD], *((f"{more} more in the JSON",) if more > 0 else ()))
@@ -148,8 +149,8 @@ def excited_lines(i: Inspection) -> tuple[tuple[Shown, tuple[str, ...]], ...]:
 def _with_advice(excited: Sequence[Excited]) -> tuple[str, ...]:
     """Effects that ask for the same drive, and look like the same others, share a line."""
     lines: dict[tuple[str, tuple[str, ...]], list[str]] = {}
-    for one in excited:
-        lines.setdefault((one.advice, one.same_as), []).append(one.name)
+    for quantity in excited:
+        lines.setdefault((quantity.advice, quantity.same_as), []).append(quantity.name)
     return tuple(
         f"{', '.join(names)}{f' (here the same as {listed(same)})' if same else ''}: {advice}"
         for (advice, same), names in lines.items()
@@ -175,7 +176,7 @@ def sigmas_text(one: Excited) -> str:
 
 def stream_rows(i: Inspection) -> list[tuple[str, ...]]:
     """STREAM_HEADER's cells of every stream, those that could not be read included."""
-    there = {one.name: stream_cells(one, i) for one in i.streams}
+    there = {stream.name: stream_cells(stream, i) for stream in i.streams}
     names: tuple[StreamName, ...] = ("wheels", "heading", "fixes")
     blank = ("-",) * (len(STREAM_HEADER) - 2)
     return [there.get(name, (name, "not read", *blank)) for name in names]

@@ -60,8 +60,8 @@ def inspection_html(i: Inspection) -> str:
         ),
         together=[line for line in (*map(witness_line, i.witnesses), course_line(i.course)) if line],
         columns=column_lines(i.columns),
-        excited=[_row(one) for shown in _TAGS for one in i.excited if one.shown == shown],
-        findings=[(one.weight, _WEIGHTS[one.weight], one_line(one.text)) for one in i.findings],
+        excited=[_row(quantity) for shown in _TAGS for quantity in i.excited if quantity.shown == shown],
+        findings=[(finding.weight, _WEIGHTS[finding.weight], one_line(finding.text)) for finding in i.findings],
         notices=warnings_first(i.notices),
         version=__version__,
     )

@@ -54,9 +54,9 @@ def inspection_text(i: Inspection, width: int = 100) -> str:
             lines += labelled(_SAYS[shown], texts, width)
     first = i.verdict.because
     told = [
-        f"{'' if one.weight == 'note' else f'{one.weight}: '}{one.text}"
-        for one in i.findings
-        if one_line(one.text) not in first
+        f"{'' if finding.weight == 'note' else f'{finding.weight}: '}{finding.text}"
+        for finding in i.findings
+        if one_line(finding.text) not in first
     ]
     if told:
         lines += ["", *labelled("findings", told, width)]
@@ -99,9 +99,12 @@ def _three(labels: Sequence[str], texts: Sequence[str], width: int) -> list[str]
 def _notices(i: Inspection, width: int) -> list[str]:
     ordered = sorted(i.notices, key=lambda one: one.severity != "warning")
     # What stands under findings need not be told twice.
-    found = " ".join(one.text for one in i.findings)
-    ordered = [one for one in ordered if str(one) not in found]
-    lines = [("warning: " if one.severity == "warning" else "") + notice_text(one) for one in ordered[:NOTICES_SHOWN]]
+    found = " ".join(finding.text for finding in i.findings)
+    ordered = [notice for notice in ordered if str(notice) not in found]
+    lines = [
+        ("warning: " if notice.severity == "warning" else "") + notice_text(notice)
+        for notice in ordered[:NOTICES_SHOWN]
+    ]
     if len(ordered) > NOTICES_SHOWN:
         lines.append(f"… and {len(ordered) - NOTICES_SHOWN} more with --json")
     return ["", *labelled("notices", lines, width)] if lines else []

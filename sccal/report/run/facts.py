@@ -56,7 +56,7 @@ def driven_lines(manoeuvres: tuple[Manoeuvre, ...]) -> tuple[Driven, ...]:
     """Every kind of driving, with those that are missing among the first six, because they are what to drive next."""
     if not manoeuvres:
         return ()
-    of_kind = {one.kind: one for one in manoeuvres}
+    of_kind = {manoeuvre.kind: manoeuvre for manoeuvre in manoeuvres}
     lines = []
     for kind, name in KINDS.items():
         one = of_kind.get(kind)  # type: ignore[call-overload]

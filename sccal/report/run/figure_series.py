@@ -137,19 +137,26 @@ def draw_residuals(sheet: Sheet, c: Calibration) -> None:
 
 def draw_consistency(sheet: Sheet, c: Calibration) -> None:
     """A panel for each kind of measurement."""
-    for k, one in enumerate(c.consistency):
-        time, x, label = _time(c, one.t_s)
-        high = min(NIS_HIGHEST, 1.15 * float(max(one.nis.max(), one.high.max(), 1.5)))
-        note = f"{100.0 * one.inside:.1f} % within their 95 % region"
+    for k, stretches in enumerate(c.consistency):
+        time, x, label = _time(c, stretches.t_s)
+        high = min(NIS_HIGHEST, 1.15 * float(max(stretches.nis.max(), stretches.high.max(), 1.5)))
+        note = f"{100.0 * stretches.inside:.1f} % within their 95 % region"
         panel = _stacked(
-            sheet, k, len(c.consistency), x, (0.0, high), f"{one.measured}: NIS per degree of freedom", label, note
+            sheet,
+            k,
+            len(c.consistency),
+            x,
+            (0.0, high),
+            f"{stretches.measured}: NIS per degree of freedom",
+            label,
+            note,
         )
-        panel.band(time, one.low, one.high, SKY)
+        panel.band(time, stretches.low, stretches.high, SKY)
         panel.level(1.0, INK)
-        values = np.minimum(one.nis, 0.985 * high)
+        values = np.minimum(stretches.nis, 0.985 * high)
         panel.line(time, values, BLUE, 0.9)
         panel.dots(time, values, BLUE, 3.4)
-        beyond = _beyond(one)
+        beyond = _beyond(stretches)
         panel.dots(time[beyond], values[beyond], VERMILION, 3.8)
 
 

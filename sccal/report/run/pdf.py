@@ -86,9 +86,9 @@ def _tables(paper: _Paper, c: Calibration) -> None:
     paper.heading("Noise and clock")
     paper.facts((*noise_facts(c.noise), ("clock", clock_line(c.clock))))
     paper.heading("What the drive excited")
-    shown = [(one.name, one.before, one.after, one.times) for one in shown_lines(c)]
+    shown = [(line.name, line.before, line.after, line.times) for line in shown_lines(c)]
     paper.table(("parameter", "sigma before", "sigma after", "times better"), shown, "lrrr")
-    driven = [(one.kind, one.time, one.distance, one.turned, one.speed) for one in driven_lines(c.manoeuvres)]
+    driven = [(line.kind, line.time, line.distance, line.turned, line.speed) for line in driven_lines(c.manoeuvres)]
     if driven:
         paper.space(8.0)
         paper.table(("driven", "time", "distance", "turned", "speed"), driven, "lrrrr")
