@@ -22,7 +22,7 @@ from sccal.effects.catalogue import CATALOGUE
 from sccal.inspect.inspect import inspect_run
 from sccal.logs.run import discover, read_run
 from sccal.logs.write import write_text
-from sccal.report.diagnosis.figures import residual_picture
+from sccal.report.diagnosis.figures import residual_plot
 from sccal.report.drawing.plan import drawn
 from sccal.report.drawing.style import BLUE, PAPER, plain_ticks, styled, svg_text
 from sccal.report.rows import Row, parameter_rows
@@ -46,7 +46,7 @@ def diagnosis(logs: str) -> str:
     found = diagnose([align(read_run(source)) for source in discover([Path(logs)])], CalibrationOptions())
     picture = found.findings[0].picture
     assert picture is not None
-    return residual_picture(picture)
+    return residual_plot(picture)
 
 
 _OF_THE_PAGE = re.compile(r"var\(--[a-z]+,([^()]*)\)")

@@ -59,7 +59,7 @@ def key_of(run: str, provenance: Provenance) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def light(calibration: Calibration) -> Calibration:
+def without_arrays(calibration: Calibration) -> Calibration:
     """The calibration without what grows with the run's length."""
     return replace(
         calibration,

@@ -20,7 +20,7 @@ from threadpoolctl import ThreadpoolController
 import sccal
 from sccal.align import align
 from sccal.arrays import Floats
-from sccal.batch.record import FileMark, RunRecord, key_of, light, record_from, record_text
+from sccal.batch.record import FileMark, RunRecord, key_of, record_from, record_text, without_arrays
 from sccal.batch.remote import RemoteRun, fetched
 from sccal.calibration.beside_small import judged_held_out, model_of_run, widened
 from sccal.calibration.by_the_others import SaidByOthers, windows_by_others
@@ -117,7 +117,7 @@ class CalibrateRun:
             files = {path.name: path.read_bytes() for path in sorted(Path(scratch).iterdir())}
         marks = {name: FileMark.of(content) for name, content in files.items()}
         # As a later call would read it, so that nothing depends on which call it was.
-        record = record_from(record_text(RunRecord(key, light(calibration), likelihood, marks)))
+        record = record_from(record_text(RunRecord(key, without_arrays(calibration), likelihood, marks)))
         return Done(record, files)
 
     def _read(self, source: RunSource) -> Run:

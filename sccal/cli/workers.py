@@ -31,7 +31,7 @@ def workers_for(paths: Sequence[Path | str], jobs: int | None, scheduler: str = 
 
         return Cluster(scheduler)
     cores = usable_cores()
-    runs, size_bytes = at_sight(paths, 2 * cores if jobs is None else jobs)
+    runs, size_bytes = runs_and_bytes(paths, 2 * cores if jobs is None else jobs)
     # A few short runs are done sooner here than another process has loaded what they need.
     worth = (runs + size_bytes // _SHORT_BYTES) // 2
     count = min(runs, worth, cores) if jobs is None else min(jobs, runs)
@@ -51,7 +51,7 @@ def one_thread_each() -> None:
         os.environ.setdefault(name, "1")
 
 
-def at_sight(paths: Sequence[Path | str], most: int) -> tuple[int, int]:
+def runs_and_bytes(paths: Sequence[Path | str], most: int) -> tuple[int, int]:
     """How many runs the paths seem to hold (up to ``most``, and so many where it cannot be seen), and their bytes."""
     count = folders = size_bytes = 0
     for path in paths:

@@ -16,7 +16,7 @@ import pytest
 
 from sccal.effects.catalogue import CATALOGUE
 from sccal.logs.streams import Notice, Vehicle
-from sccal.report.diagnosis.figures import candidates, drift_before_after, finding_drawings, residual_picture
+from sccal.report.diagnosis.figures import candidates, drift_before_after, finding_drawings, residual_plot
 from sccal.report.diagnosis.page import diagnosis_html
 from sccal.report.diagnosis.text import cause_clause, change_clause, diagnosis_text, next_line, verdict_sentence
 from sccal.report.write import write_diagnosis
@@ -534,8 +534,8 @@ def test_figures_are_small_well_formed_and_the_same_every_time(d: Diagnosis) -> 
 
 def test_figures_survive_holes() -> None:
     holed = replace(picture(points=200), after=np.full(200, NAN), before_sigma=np.full(200, NAN))
-    ElementTree.fromstring(residual_picture(holed))
-    ElementTree.fromstring(residual_picture(replace(holed, before=np.where(np.arange(200) % 3, NAN, 1.0))))
+    ElementTree.fromstring(residual_plot(holed))
+    ElementTree.fromstring(residual_plot(replace(holed, before=np.where(np.arange(200) % 3, NAN, 1.0))))
     ElementTree.fromstring(candidates(replace(RIGHT, ranking=RIGHT.ranking[1:]), NAN))
 
 

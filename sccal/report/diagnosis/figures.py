@@ -100,7 +100,7 @@ def drift_drawing(d: Diagnosis) -> Drawing | None:
 TITLES = ("without the effect", "with the effect")
 
 
-def residual_picture(picture: Picture, titles: tuple[str, str] = TITLES) -> str:
+def residual_plot(picture: Picture, titles: tuple[str, str] = TITLES) -> str:
     """Before with the fitted effect, and after, on one scale; one panel where there is no after."""
     with styled("residual picture"):
         figure = Figure(figsize=(_WIDE_IN, 3.3))

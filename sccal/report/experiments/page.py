@@ -40,7 +40,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownDrive:
     """One drive under one fault as the page shows it."""
 
     key: str
@@ -62,7 +62,7 @@ class Section:
     key: str
     title: str
     clause: str
-    drives: tuple[Shown, ...]
+    drives: tuple[ShownDrive, ...]
 
 
 def experiments_html(e: Experiments) -> str:
@@ -99,9 +99,9 @@ def _sections(e: Experiments) -> list[Section]:
     ]
 
 
-def _shown(line: Line, key: str) -> Shown:
+def _shown(line: Line, key: str) -> ShownDrive:
     cell = line.cell
-    return Shown(
+    return ShownDrive(
         key=key,
         name=sentence(drive_name(cell), stop=False) if not cell.measured else drive_name(cell),
         line=line,

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from sccal.arrays import Floats
 from sccal.report.drawing.style import BLUE, GREY, SKY, VERMILION, full_tick_labels, plain_ticks, styled, svg_text
-from sccal.report.fleet.lines import Shown, shown
+from sccal.report.fleet.lines import DisplayedParameter, displayed
 from sccal.results.summary import Chart, ThinPath
 
 PATH_UNITS = 1000
@@ -52,12 +52,12 @@ def _fitted(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
 
 
 def _draw(axes: Axes, chart: Chart) -> None:
-    as_shown = shown(chart.key)
+    parameter = displayed(chart.key)
     at, edges = _abscissa(chart)
-    lower, upper = as_shown.factor * chart.lower, as_shown.factor * chart.upper
-    value, sigma = as_shown.factor * chart.value, as_shown.factor * chart.sigma
+    lower, upper = parameter.factor * chart.lower, parameter.factor * chart.upper
+    value, sigma = parameter.factor * chart.value, parameter.factor * chart.sigma
     axes.stairs(upper, edges, baseline=lower, fill=True, color=SKY, alpha=0.25, lw=0)
-    axes.axhline(as_shown.factor * chart.centre, color=GREY, lw=0.9)
+    axes.axhline(parameter.factor * chart.centre, color=GREY, lw=0.9)
     low, high = _panel_limits(value, sigma, lower, upper, chart)
     gaps = np.full_like(value, np.nan)
     bars = np.column_stack([value - sigma, value + sigma, gaps]).ravel()
@@ -69,13 +69,13 @@ def _draw(axes: Axes, chart: Chart) -> None:
     if chart.trend is not None:
         step = chart.trend.shape == "step"
         axes.plot(
-            at, as_shown.factor * chart.trend.fitted, color=VERMILION, lw=1.4, ls=(0, (5, 2)),
+            at, parameter.factor * chart.trend.fitted, color=VERMILION, lw=1.4, ls=(0, (5, 2)),
             drawstyle="steps-mid" if step else "default",
         )  # fmt: skip
     axes.set_ylim(low, high)
     axes.set_xlim(edges[0], edges[-1])
-    axes.set_title(_title(as_shown, chart))
-    axes.set_ylabel(as_shown.unit)
+    axes.set_title(_title(parameter, chart))
+    axes.set_ylabel(parameter.unit)
     plain_ticks(axes, 4)
     if chart.by_date:
         locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
@@ -110,6 +110,6 @@ def _panel_limits(value: Floats, sigma: Floats, lower: Floats, upper: Floats, ch
     return low - margin, high + margin
 
 
-def _title(as_shown: Shown, chart: Chart) -> str:
+def _title(parameter: DisplayedParameter, chart: Chart) -> str:
     count = int(chart.outside.sum())
-    return f"{as_shown.name} ({as_shown.unit})" + (f", {count} outside" if count else "")
+    return f"{parameter.name} ({parameter.unit})" + (f", {count} outside" if count else "")

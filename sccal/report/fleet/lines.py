@@ -22,7 +22,7 @@ BY_NAME = "(in the order of their names, for want of dates)"
 
 
 @dataclass(frozen=True)
-class Shown:
+class DisplayedParameter:
     """How a parameter is shown: lengths of the model in mm, where their sigmas have readable digits."""
 
     key: str
@@ -40,7 +40,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Headline:
+class FleetHeadline:
     """What stands at the top of the page."""
 
     level: str
@@ -48,20 +48,20 @@ class Headline:
 
 
 _OF_MODEL = {
-    "radius_right_m": Shown("radius_right_m", "right radius", "mm", 1e3),
-    "radius_left_m": Shown("radius_left_m", "left radius", "mm", 1e3),
-    "track_m": Shown("track_m", "track", "mm", 1e3),
-    "heading_offset_deg": Shown("heading_offset_deg", "heading offset", "deg", 1.0),
+    "radius_right_m": DisplayedParameter("radius_right_m", "right radius", "mm", 1e3),
+    "radius_left_m": DisplayedParameter("radius_left_m", "left radius", "mm", 1e3),
+    "track_m": DisplayedParameter("track_m", "track", "mm", 1e3),
+    "heading_offset_deg": DisplayedParameter("heading_offset_deg", "heading offset", "deg", 1.0),
 }
 
 
-def shown(key: str) -> Shown:
+def displayed(key: str) -> DisplayedParameter:
     """Of a chart's key: one of the model's four, or an effect, a dot and a parameter."""
     if key in _OF_MODEL:
         return _OF_MODEL[key]
     effect, _, parameter = key.partition(".")
     row = effect_rows({effect: {parameter: Estimate(0.0, 0.0, "estimated")}})[0]
-    return Shown(key, one_line(row.name), row.unit, 1.0)
+    return DisplayedParameter(key, one_line(row.name), row.unit, 1.0)
 
 
 def with_sentences(summary: Summary) -> Summary:
@@ -91,15 +91,15 @@ def change_sentence(vehicle: str, chart: Chart) -> str:
     """``The left radius of robot-7 has been shrinking since 2026-05-03: -0.40 ± 0.07 mm in 60 days (5.7 sigma, …).``"""
     trend = chart.trend
     assert trend is not None
-    as_shown = shown(chart.key)
-    subject = f"The {as_shown.name} of {one_line(vehicle)}"
-    change = _change(trend, as_shown)
+    parameter = displayed(chart.key)
+    subject = f"The {parameter.name} of {one_line(vehicle)}"
+    change = _change(trend, parameter)
     sure = f"({plain(abs(trend.change) / trend.sigma, 2)} sigma, {int((~chart.set_aside).sum())} runs)"
     if trend.shape == "step":
         before, after = _moments(chart, trend)
         order = "" if chart.by_date else f" {BY_NAME}"
         return f"{subject} changed between {before} and {after} by {change} {sure}{order}."
-    lengths = as_shown.unit in ("mm", "m")
+    lengths = parameter.unit in ("mm", "m")
     falls = trend.change < 0.0
     verb = ("shrinking" if falls else "growing") if lengths else ("falling" if falls else "rising")
     since, until = _moments(chart, trend)
@@ -110,29 +110,29 @@ def change_sentence(vehicle: str, chart: Chart) -> str:
     return f"{subject}{onset} has been {verb} {time}: {change} until {until} {sure} {BY_NAME}."
 
 
-def headline(summary: Summary) -> Headline:
+def headline(summary: Summary) -> FleetHeadline:
     """The changes first, then what failed; and what could not be asked."""
     told = changes(summary)
     charts = sum(len(vehicle.charts) for vehicle in summary.vehicles)
     failed = f"{_count(summary.totals.failed, 'run')} gave no result; the reasons stand below."
     also = [failed] if summary.totals.failed else []
     if told:
-        return Headline(f"changing: {_count(len(told), 'parameter')}", (*told, *also))
+        return FleetHeadline(f"changing: {_count(len(told), 'parameter')}", (*told, *also))
     if not summary.runs:
-        return Headline("no results", tuple(also) or ("There was no run.",))
+        return FleetHeadline("no results", tuple(also) or ("There was no run.",))
     if charts:
         tested = sum(chart.tested for vehicle in summary.vehicles for chart in vehicle.charts)
         steady = (
             f"No parameter changes over the runs beyond what chance explains ({_count(tested, 'chart')} looked at)."
         )
         few = "A chart needs 5 runs at different times to show a change; none has them."
-        return Headline("steady" if tested else "too few runs", (steady if tested else few, *also))
-    return Headline("too few runs", ("No parameter has enough runs for a chart over time.", *also))
+        return FleetHeadline("steady" if tested else "too few runs", (steady if tested else few, *also))
+    return FleetHeadline("too few runs", ("No parameter has enough runs for a chart over time.", *also))
 
 
 def chart_line(chart: Chart) -> str:
     """Centre, scatter, runs outside, and what did not take part."""
-    as_shown = shown(chart.key)
+    parameter = displayed(chart.key)
     outside = [run for run, out in zip(chart.runs, chart.outside, strict=True) if out]
     parts = [_count(len(chart.runs), "run")]
     if chart.left_out:
@@ -140,7 +140,7 @@ def chart_line(chart: Chart) -> str:
     if not chart.by_date:
         parts.append("in the order of their names, for want of dates")
     parts.append(
-        f"scatter between runs {plain(as_shown.factor * chart.scatter, 2)} {as_shown.unit}"
+        f"scatter between runs {plain(parameter.factor * chart.scatter, 2)} {parameter.unit}"
         if chart.scatter
         else "their own sigmas explain the scatter"
     )
@@ -194,9 +194,9 @@ def _span(days: float | None) -> str:
     return f"{days:.0f} days" if days >= 2.0 else duration(86400.0 * days)
 
 
-def _change(trend: Trend, as_shown: Shown) -> str:
-    value, sigma = value_and_sigma(as_shown.factor * trend.change, as_shown.factor * trend.sigma)
-    return f"{'' if value.startswith('-') else '+'}{value} ± {sigma} {as_shown.unit}".rstrip()
+def _change(trend: Trend, parameter: DisplayedParameter) -> str:
+    value, sigma = value_and_sigma(parameter.factor * trend.change, parameter.factor * trend.sigma)
+    return f"{'' if value.startswith('-') else '+'}{value} ± {sigma} {parameter.unit}".rstrip()
 
 
 def _names(runs: Sequence[str], most: int = 4) -> str:

@@ -14,11 +14,11 @@ from sccal import __version__
 from sccal.report.fleet.figures import control_chart, path_strokes
 from sccal.report.fleet.lines import (
     LEVEL_MARKS,
-    Shown,
+    DisplayedParameter,
     chart_line,
     day,
+    displayed,
     headline,
-    shown,
     total_line,
     vehicle_line,
     versions_line,
@@ -141,14 +141,14 @@ def index_html(summary: Summary) -> str:
     )  # fmt: skip
 
 
-def _columns(summary: Summary) -> list[Shown]:
+def _columns(summary: Summary) -> list[DisplayedParameter]:
     effects = Counter(
         f"{effect}.{name}" for run in summary.runs for effect, named in run.effects.items() for name in named
     )
-    return [shown(key) for key in (*PARAMETERS, *list(effects)[:MOST_EFFECT_COLUMNS])]
+    return [displayed(key) for key in (*PARAMETERS, *list(effects)[:MOST_EFFECT_COLUMNS])]
 
 
-def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow:
+def _row(run: RunLine, columns: Sequence[DisplayedParameter], with_vehicle: bool) -> TableRow:
     effects = {
         f"{effect}.{name}": estimate for effect, named in run.effects.items() for name, estimate in named.items()
     }
@@ -175,7 +175,7 @@ def _row(run: RunLine, columns: Sequence[Shown], with_vehicle: bool) -> TableRow
     )
 
 
-def _estimate(column: Shown, estimate: Estimate | None) -> Cell:
+def _estimate(column: DisplayedParameter, estimate: Estimate | None) -> Cell:
     if estimate is None:
         return Cell("–", "")
     tag = "" if estimate.status == "estimated" else _STATUS_WORDS.get(estimate.status, one_line(estimate.status))
@@ -200,19 +200,19 @@ def _vehicle(vehicle: VehicleSummary, drawn: bool) -> VehiclePart:
         line=vehicle_line(vehicle),
         link="" if stem is None or vehicle.runs < 2 else "./" + quote(f"{stem}.html", errors="replace"),
         charts=tuple(_chart(vehicle, chart, drawn) for chart in vehicle.charts),
-        without=tuple((shown(one.key).name, one_line(one.reason)) for one in vehicle.no_charts),
+        without=tuple((displayed(one.key).name, one_line(one.reason)) for one in vehicle.no_charts),
         drawn=drawn,
     )
 
 
 def _chart(vehicle: VehicleSummary, chart: Chart, drawn: bool) -> ChartPart:
-    as_shown = shown(chart.key)
+    parameter = displayed(chart.key)
     shared = vehicle.parameters.get(chart.key)
     value = ""
     if shared is not None and shared.status == "estimated":
-        value = f"{as_shown.text(shared)} {as_shown.unit} over all runs"
+        value = f"{parameter.text(shared)} {parameter.unit} over all runs"
     return ChartPart(
-        name=as_shown.name,
+        name=parameter.name,
         value=value,
         says=chart_line(chart),
         change="" if chart.trend is None else chart.trend.sentence,

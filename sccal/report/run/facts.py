@@ -43,7 +43,7 @@ class Driven:
 
 
 @dataclass(frozen=True)
-class Shown:
+class Narrowed:
     """One line of the table of what the drive shows: how much narrower a parameter has become."""
 
     name: str
@@ -77,17 +77,17 @@ def driven_lines(manoeuvres: tuple[Manoeuvre, ...]) -> tuple[Driven, ...]:
     return tuple(lines)
 
 
-def shown_lines(c: Calibration) -> tuple[Shown, ...]:
+def narrowed_lines(c: Calibration) -> tuple[Narrowed, ...]:
     """Each parameter's sigma before the run and after it."""
     lines = []
     for row in parameter_rows(c.parameters):
         prior, sigma = row.estimate.prior_sigma, row.estimate.sigma
         if row.estimate.status == "held":
-            lines.append(Shown(row.name, "held", "held", ""))
+            lines.append(Narrowed(row.name, "held", "held", ""))
             continue
         known = prior is not None and math.isfinite(sigma) and sigma > 0.0
         lines.append(
-            Shown(
+            Narrowed(
                 row.name,
                 "unknown" if prior is None else f"{plain(prior, 2)} {row.unit}",
                 f"{plain(sigma, 2)} {row.unit}" if math.isfinite(sigma) else MISSING,

@@ -6,7 +6,7 @@ from sccal import __version__
 from sccal.report.page import page
 from sccal.report.rows import effect_rows, parameter_rows
 from sccal.report.run.advice import advice_on
-from sccal.report.run.facts import driven_lines, fit_facts, origin_lines, shown_lines, started, variant
+from sccal.report.run.facts import driven_lines, fit_facts, narrowed_lines, origin_lines, started, variant
 from sccal.report.run.figures import run_drawings
 from sccal.report.sentences import clock_line, drive_line, noise_facts, warnings_first
 from sccal.results.calibration import Calibration
@@ -26,7 +26,7 @@ def run_html(c: Calibration) -> str:
         drawings=run_drawings(c),
         fit=fit_facts(c),
         noise=(*noise_facts(c.noise), ("clock", clock_line(c.clock))),
-        shown=shown_lines(c),
+        shown=narrowed_lines(c),
         driven=driven_lines(c.manoeuvres),
         origins=origin_lines(c.provenance) if c.provenance else (),
         notices=warnings_first(c.notices),

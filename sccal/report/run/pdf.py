@@ -23,7 +23,7 @@ from sccal.report.drawing.plan import Plan
 from sccal.report.drawing.style import FACE, GREEN, GRID, INK, ORANGE, SOFT, VERMILION, styled
 from sccal.report.rows import Row, effect_rows, parameter_rows
 from sccal.report.run.advice import advice_on
-from sccal.report.run.facts import driven_lines, fit_facts, origin_lines, shown_lines, started, variant
+from sccal.report.run.facts import driven_lines, fit_facts, narrowed_lines, origin_lines, started, variant
 from sccal.report.run.figures import run_plans
 from sccal.report.sentences import clock_line, drive_line, noise_facts, notice_text, warnings_first
 from sccal.results.calibration import Calibration
@@ -86,7 +86,7 @@ def _tables(paper: _Paper, c: Calibration) -> None:
     paper.heading("Noise and clock")
     paper.facts((*noise_facts(c.noise), ("clock", clock_line(c.clock))))
     paper.heading("What the drive excited")
-    shown = [(line.name, line.before, line.after, line.times) for line in shown_lines(c)]
+    shown = [(line.name, line.before, line.after, line.times) for line in narrowed_lines(c)]
     paper.table(("parameter", "sigma before", "sigma after", "times better"), shown, "lrrr")
     driven = [(line.kind, line.time, line.distance, line.turned, line.speed) for line in driven_lines(c.manoeuvres)]
     if driven:

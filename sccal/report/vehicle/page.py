@@ -18,7 +18,7 @@ from sccal.results.verdict import Verdict
 
 
 @dataclass(frozen=True)
-class RunLine:
+class RunRow:
     """One line of the vehicle's table of runs."""
 
     name: str
@@ -41,7 +41,7 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
         verdict=verdict,
         advice=advice_on(v, verdict),
         rows=(*parameter_rows(v.parameters), *effect_rows(v.effects)),
-        runs=[_run_line(c) for c in v.runs],
+        runs=[_run_row(c) for c in v.runs],
         total=f"{count} · {time} · {plain(sum(c.drive.distance_m for c in v.runs))} m",
         drawings=vehicle_drawings(v),
         fit=(
@@ -57,7 +57,7 @@ def vehicle_html(v: VehicleCalibration, json_link: str = "vehicle.json") -> str:
     )
 
 
-def _run_line(c: Calibration) -> RunLine:
+def _run_row(c: Calibration) -> RunRow:
     drift = "–" if c.outage.end_rms_m is None else plain(c.outage.end_rms_m, 2)
     link = "./" + quote(c.run, errors="replace") + "/report.html"
-    return RunLine(one_line(c.run), link, parameter_rows(c.parameters), drift, c.verdict)
+    return RunRow(one_line(c.run), link, parameter_rows(c.parameters), drift, c.verdict)
