@@ -28,13 +28,24 @@ def with_moved(found: Sequence[Finding], runs: Sequence[Aligned]) -> tuple[Findi
         if moved is None:
             continue
         if effect.name in findings:
-            whole = _together(findings.pop(effect.name), moved)
+            whole = _together(findings[effect.name], moved)
+            findings[effect.name] = whole
             # A smoothed stream lags, is moved to where it fits best, and is moved back by the fit that knows better.
-            if abs(next(iter(whole.parameters.values())).value) >= effect.parameters[0].matters:
-                findings[effect.name] = whole
+            if abs(next(iter(whole.parameters.values())).value) < effect.parameters[0].matters:
+                _leave_out(findings, effect.name)
         else:
             first.append(moved)
     return (*first, *findings.values())
+
+
+def _leave_out(findings: dict[str, Finding], name: str) -> None:
+    """Take a finding away: the one before it ends where it ended, or else the next begins where it began."""
+    order = list(findings)
+    place, gone = order.index(name), findings.pop(name)
+    if place:
+        findings[order[place - 1]] = replace(findings[order[place - 1]], drift_after_m=gone.drift_after_m)
+    elif len(order) > 1:
+        findings[order[1]] = replace(findings[order[1]], drift_before_m=gone.drift_before_m)
 
 
 def _moved(effect: Effect, runs: Sequence[Aligned]) -> Finding | None:

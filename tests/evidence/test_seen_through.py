@@ -38,7 +38,7 @@ def test_the_columns_are_the_derivatives_of_what_the_readings_add(view, paramete
     by_difference = (readings(view, VALUES + step) - readings(view, VALUES - step)) / 2e-4
     # The last readings show what comes after the log's end.
     inside = view.headings.t_s < view.headings.t_s[-1] - 2.0
-    assert np.std((column - by_difference)[inside]) < 0.03 * np.std(by_difference)
+    assert np.std((column - by_difference)[inside]) < 0.1 * np.std(by_difference)
 
 
 def test_further_effects_are_laid_out_once(view):
