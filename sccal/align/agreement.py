@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sccal.align.counters import reverse_notices
 from sccal.align.path import laid_out
+from sccal.align.proportions import proportion_doubts, wheel_turn
+from sccal.align.reasons import why_apart
 from sccal.align.scale import increments_correlation
-from sccal.align.signs import slope_through_origin, wheel_turn
+from sccal.align.signs import slope_through_origin
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.names import ENCODER_FILE
@@ -52,7 +55,8 @@ LAGS_S = np.arange(1.0, 15.1, 0.5)
 
 def check_agreement(aligned: Aligned) -> list[Notice]:
     """Doubts about stretches in which the streams do not move together; DataError where yaw and wheels never do."""
-    return [*_yaw_against_wheels(aligned), *_fixes_against_wheels(aligned)]
+    found = [*_yaw_against_wheels(aligned), *_fixes_against_wheels(aligned)]
+    return [*found, *proportion_doubts(aligned), *reverse_notices(aligned)]
 
 
 def _chunks(t_s: Floats) -> list[Ints]:
@@ -86,7 +90,7 @@ def _yaw_against_wheels(aligned: Aligned) -> list[Notice]:
             apart.append(float(t_s[rows[0]]))
     if not apart:
         return []
-    advice = "one of the streams is shifted in time, or frozen"
+    advice = why_apart(aligned, t_s, wheels, yaw, watched)
     if len(apart) == judged and judged > 1:
         correlation = slope_through_origin(wheels[clear], yaw[clear]).correlation
         if abs(increments_correlation(aligned, t_s, yaw)) > INCREMENTS:

@@ -12,6 +12,7 @@ from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m
 from sccal.align.agreement import check_agreement
 from sccal.align.clock_motion import MotionClock
 from sccal.align.clocks import require_overlap
+from sccal.align.codes import by_scatter
 from sccal.align.digits import OF_ROUNDING, step_of
 from sccal.align.heading_clock import HeadingClock
 from sccal.align.one_clock import (
@@ -187,6 +188,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     require_overlap(t_s[timed], span, clock, "the fixes")
 
     timed &= ~compared.old
+    coded = by_scatter(fixes, path, t_s, timed)
+    fixes, timed, notices = coded.fixes, timed & ~coded.left_out, [*notices, *coded.notices]
     good = timed & usable(fixes.quality)
     unused = []
     for code in np.unique(fixes.quality[timed & ~good]):

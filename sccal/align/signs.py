@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sccal.align.counters import check_directions, check_stops
 from sccal.align.path import laid_out
+from sccal.align.proportions import check_gain, check_proportions, check_sides, wheel_turn
+from sccal.align.reasons import check_goes_round
 from sccal.align.scale import check_scale, unit_of_yaw
 from sccal.arrays import Complexes, Floats
 from sccal.errors import DataError
@@ -28,6 +31,8 @@ MIN_TRAVEL_SIGMAS = 8.0
 MIN_WINDOWS = 8
 STRETCH_RAD = 4.0
 CLEARLY_WORSE = 2.0
+LEAST_SLOPE = 0.4
+"""Of the yaw on the wheels, as declared, that turn together: tracks that skid turn half as far as they seem to."""
 STUCK_TRAVEL_M = 5.0
 STUCK_SHARE = 0.02
 STUCK_YAW_RAD = np.radians(1.0)
@@ -62,18 +67,14 @@ def slope_through_origin(x: Floats, y: Floats) -> Slope:
 def check_signs(aligned: Aligned) -> None:
     """Raise DataError where a sign is certainly wrong; say nothing where the drive cannot tell."""
     _check_that_both_wheels_turn(aligned)
+    check_stops(aligned)
     check_scale(aligned)
     windows = _fix_windows(aligned)
     if windows is not None:
         _check_wheel_directions(aligned, *windows)
     _check_turning(aligned)
-
-
-def wheel_turn(aligned: Aligned, t_s: Floats) -> Floats:
-    """Turning by the wheels (rad, nominal radius and track) up to each time."""
-    difference = aligned.right_rad - aligned.left_rad
-    scale = aligned.vehicle.wheel_radius_m / aligned.vehicle.track_m
-    return scale * np.interp(t_s, aligned.wheel_t_s, difference)
+    check_directions(aligned)
+    check_proportions(aligned)
 
 
 def _fix_windows(aligned: Aligned) -> tuple[Floats, Floats, Floats] | None:
@@ -116,6 +117,9 @@ def _check_wheel_directions(aligned: Aligned, t_s: Floats, east_m: Floats, north
         return
     yaw = np.diff(np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad))
     turning = slope_through_origin(right + left, yaw)
+    as_declared = slope_through_origin((right - left) / aligned.vehicle.track_m, yaw)
+    if as_declared.clear and LEAST_SLOPE < abs(as_declared.value) < 1.0 / LEAST_SLOPE:
+        return  # A robot that turns on the spot moves an antenna off its middle.
     who, column = "one wheel", "left_ticks or right_ticks"
     if turning.clear:
         side = "left" if turning.value > 0 else "right"
@@ -150,6 +154,8 @@ def _check_turning(aligned: Aligned) -> None:
     if np.abs(wheels).sum() < MIN_TURN_RAD or np.abs(yaw).sum() < MIN_TURN_RAD:
         return
     yaw_on_wheels = slope_through_origin(wheels, yaw)
+    check_goes_round(aligned, yaw_on_wheels.correlation)
+    check_sides(aligned)
     if yaw_on_wheels.clear and (unit := unit_of_yaw(yaw_on_wheels.value)):
         raise DataError(
             f"{aligned.heading_source}: the yaw turns {abs(yaw_on_wheels.value):.3g} times as far as the wheels "
@@ -159,6 +165,7 @@ def _check_turning(aligned: Aligned) -> None:
     if not yaw_on_wheels.opposed:
         if yaw_on_wheels.clear:
             _check_mirrored_places(aligned)
+            check_gain(aligned, yaw_on_wheels.value)
         return
 
     convention = aligned.heading_convention or aligned.vehicle.convention
@@ -169,10 +176,7 @@ def _check_turning(aligned: Aligned) -> None:
         f"the AHRS yaw turns against the wheels (slope {yaw_on_wheels.value:+.2f}, "
         f"correlation {yaw_on_wheels.correlation:+.2f} over {yaw_on_wheels.windows} s)"
     )
-    swapped = (
-        f"left and right wheels look swapped: exchange left_ticks and right_ticks in {ENCODER_FILE} (or, if both count "
-        "backwards, negate both)"
-    )
+    swapped = _swapped(aligned)
     mirrored = (
         f'set convention = "{other}" under [ahrs] in {VEHICLE_FILE} (it is "{convention}"), '
         "or, for quaternions in messages, give --orientation ned"
@@ -184,6 +188,26 @@ def _check_turning(aligned: Aligned) -> None:
     if yaw_fits is False and wheels_fit is not False:
         raise DataError(f"{seen}, and the path of the fixes sides with the wheels: {mirrored}")
     raise DataError(f"{seen}, and the fixes do not tell which is right: {mirrored}, or, if that was right, {swapped}")
+
+
+def _swapped(aligned: Aligned) -> str:
+    """What to do where wheels turn the other way round: exchanged or both reversed, the likelier first.
+
+    Robots go forward more than back.
+    """
+    steps = np.diff(aligned.travel_m)
+    back, way = float(np.maximum(-steps, 0.0).sum()), float(np.abs(steps).sum())
+    share = f"{100.0 * back / max(way, 1e-9):.0f} % of the way by the wheels"
+    if back > 0.5 * way:
+        return (
+            f"both wheels look as if they count backwards, for {share} is in reverse: negate both left_ticks and "
+            f"right_ticks in {ENCODER_FILE} (or, if the robot did drive so, exchange them: push it forward, and both "
+            "counts must rise)"
+        )
+    return (
+        f"left and right wheels look swapped: exchange left_ticks and right_ticks in {ENCODER_FILE} (or, if both count "
+        f"backwards and {share} being in reverse is not so, negate both: push the robot forward, and both must rise)"
+    )
 
 
 def _check_mirrored_places(aligned: Aligned) -> None:

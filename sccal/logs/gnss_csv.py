@@ -11,6 +11,7 @@ from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.place_units import in_ten_millionths, notation_of
+from sccal.logs.quality import quality_of
 from sccal.logs.quality_words import RTKLIB, mapped, of_novatel
 from sccal.logs.streams import FixStream, Notice
 from sccal.logs.table import Table, read_table
@@ -106,7 +107,7 @@ def _with_quality(table: Table) -> Table:
     if codes is None:
         column = next((name for name in ("Q", "q") if name in table.columns), None)
         if column is None:
-            return table
+            return _with_status(table)
         codes, told = mapped(table.columns[column], RTKLIB), f"column {column} read as RTKLIB's quality codes"
     elif (novatel := of_novatel(codes)) is not None:
         codes, told = (
@@ -118,6 +119,17 @@ def _with_quality(table: Table) -> Table:
     every = np.ones(table.line.size, dtype=np.bool_)
     table = table.keep(every, [Notice(table.source, told, table.line.size, f"line {table.line[0]}", "warning")])
     return replace(table, columns={**table.columns, "fix_quality": codes})
+
+
+def _with_status(table: Table) -> Table:
+    """The table with GGA's qualities where a column status can only be that of NavSatFix: −1, 0, 1 and 2, and fixes."""
+    status = table.columns.get("status")
+    if status is None or not np.isin(status[np.isfinite(status)], (-1, 0, 1, 2)).all() or np.ptp(status) == 0.0:
+        return table
+    sigma_m = table.columns.get("sigma_m", np.full(status.size, np.nan))
+    told = Notice(table.source, "rows whose status is read as that of NavSatFix (2 RTK, 1 SBAS, 0 a fix)", status.size)
+    table = table.keep(np.ones(status.size, dtype=np.bool_), [told])
+    return replace(table, columns={**table.columns, "fix_quality": quality_of(status, sigma_m).astype(np.float64)})
 
 
 def _in_degrees(table: Table) -> Table:
