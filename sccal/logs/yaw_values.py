@@ -62,7 +62,7 @@ def turn_of(values: Floats) -> float | None:
 
 def stands_for_none(values: Floats, full_turn: float) -> tuple[Bools, float | None]:
     """Which headings (n) are no readings, and the number that they are; a full turn is ``full_turn`` in their unit."""
-    if values.size < _LONG_RUN:
+    if values.size < _LONG_RUN or float(np.max(np.abs(np.diff(values)))) <= _LEAST_JUMP * full_turn:
         return np.zeros(values.size, dtype=np.bool_), None
     begins = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0) + 1))
     value, rows = values[begins], np.diff(np.append(begins, values.size))

@@ -111,7 +111,10 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
 def _best_kind(dated: Dated, source: str, notices: list[Notice]) -> _Readings | None:
     """The first kind that has at least half as many usable readings as the richest."""
     found: list[tuple[_Readings, list[Notice]]] = []
+    there = np.bincount(dated.sentences.kind, minlength=256)
     for kind in READ_FOR_HEADINGS:
+        if not there[kind]:
+            continue
         usable = dated.sentences.kind == kind
         if kind not in UNTIMED:
             usable &= np.isfinite(dated.running_s)

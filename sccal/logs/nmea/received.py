@@ -24,7 +24,7 @@ from sccal.logs.streams import Notice
 ZONE_STEP_S = 900.0
 """Zones of the world are whole quarters of an hour from UTC."""
 _SAMPLE = 200
-_LOOKED_AT = 600
+_LOOKED_AT = 200
 """Sentences from which it is told whether there is anything to read at all."""
 _MOST_BEFORE = 400
 """Bytes before a sentence in which its time is looked for."""

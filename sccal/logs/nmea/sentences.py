@@ -298,8 +298,14 @@ def _kinds(words: Words, start: Ints, stop: Ints) -> tuple[Kinds, NDArray[np.uin
     shift = np.zeros(start.size, dtype=np.int64)
     own = np.flatnonzero(~usual & (start + 6 < stop))
     if own.size:
+        named = address[own]
         for name, pattern in _NAMES:
-            kind[own[_reads(address[own], pattern)]] = name
+            hit = _reads(named, pattern)
+            if hit.any():
+                kind[own[hit]] = name
+                own, named = own[~hit], named[~hit]
+            if not own.size:
+                return kind, talker, shift
         for maker, name, pattern in _NAMED_AFTER:
             made = own[_reads(address[own], maker)]
             rows = made[_reads(words[start[made] + 6], pattern)]

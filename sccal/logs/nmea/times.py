@@ -87,8 +87,15 @@ def _give_fractions(sentences: Sentences, running_s: Floats, source: str, notice
 
     Two receivers that give one fix a second each look alike, so it takes three in a second, of one talker.
     """
+    there = np.bincount(sentences.kind, minlength=256)
     for kind in READ_FOR_POSITIONS:
-        rows = np.flatnonzero((sentences.kind == kind) & np.isfinite(running_s))
+        if not there[kind]:
+            continue
+        rows = np.flatnonzero(sentences.kind == kind)
+        begin_s = running_s[rows[:_FEWEST_ROWS]]
+        if (begin_s != np.floor(begin_s))[np.isfinite(begin_s)].any():
+            continue
+        rows = rows[np.isfinite(running_s[rows])]
         t_s = running_s[rows]
         if rows.size < _FEWEST_IN_SECONDS * _FEWEST_ROWS or not (t_s == np.floor(t_s)).all():
             continue
