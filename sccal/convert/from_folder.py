@@ -45,6 +45,11 @@ def tables_of_folder(source: RunSource) -> RunTables:
         ahrs = _log_table(ahrs_table, listed.file(AHRS_FILE), notices)
     if listed.fix_file == NMEA_FILE:
         nmea = nmea_lines(listed.file(NMEA_FILE).read_bytes(), encoder.t_s, listed.file(NMEA_FILE), notices)
+    elif listed.foreign:
+        raise DataError(
+            f"{folder / listed.foreign}: fixes of another program are calibrated as they are, and not converted: write "
+            f"{GNSS_FILE} instead"
+        )
     else:
         gnss = _log_table(gnss_table, listed.file(GNSS_FILE), notices)
     return RunTables(

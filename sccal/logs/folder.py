@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from sccal.errors import DataError
-from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag, run_files_in
+from sccal.logs.formats import FIXES, HEADINGS, RUN_FILES, WHEELS, are_of_a_bag, foreign_fixes, run_files_in
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE, VEHICLE_FILE
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Vehicle, WheelStream
 
@@ -34,6 +34,8 @@ class RunFolder:
     """How the folder spells a run file's name, where not as the contract does."""
     others: tuple[str, ...] = ()
     """Files that may be logs under other names, for messages."""
+    foreign: str = ""
+    """A file of another program that its fixes are read from, where none of the run files holds them."""
 
     def file(self, name: str) -> Path:
         """Where a run file is."""
@@ -42,7 +44,7 @@ class RunFolder:
     @property
     def fix_file(self) -> str:
         """The file that the fixes are read from; empty where there is none."""
-        return self._first(FIXES)
+        return self._first(FIXES) or self.foreign
 
     @property
     def wheel_path(self) -> Path:
@@ -85,7 +87,7 @@ class RunFolder:
     def fixes(self) -> tuple[FixStream, tuple[Notice, ...]]:
         """The fixes; a second file with fixes is told, and not read."""
         name = self.fix_file or self._lacking(_ANY_FIXES)
-        fixes, notices = FIXES[name](self.file(name))
+        fixes, notices = (foreign_fixes(name) or FIXES[name])(self.file(name))
         others = [other for other in self.there if other in FIXES and other != name]
         notices = (*(Notice(other, f"file not read because {name} is there too", 1) for other in others), *notices)
         require_rows(self.path / name, fixes.lat_deg.size, notices)
@@ -108,7 +110,9 @@ def listed_folder(path: Path) -> RunFolder:
     spelled = {name: theirs for name, theirs in actual.items() if theirs != name}
     known = {*actual.values(), *_OWN}
     others = tuple(sorted(name for name in names - known if (path / name).is_file() and not name.startswith(".")))
-    return RunFolder(path, there, odd, not there and are_of_a_bag(names), spelled, others[:_MOST_OTHERS])
+    foreign = [name for name in others if foreign_fixes(name) is not None]
+    only = foreign[0] if len(foreign) == 1 else ""
+    return RunFolder(path, there, odd, not there and are_of_a_bag(names), spelled, others[:_MOST_OTHERS], only)
 
 
 def require_rows(path: Path | str, usable: int, notices: Sequence[Notice]) -> None:

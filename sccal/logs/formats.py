@@ -64,15 +64,28 @@ def _nmea_heading(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
 
 
 def _nmea_fixes(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
+    from sccal.logs.gpsd import looks_like_gpsd, read_gpsd
     from sccal.logs.nmea import read_nmea
 
-    return read_nmea(path)
+    return read_gpsd(path) if looks_like_gpsd(path) else read_nmea(path)
 
 
 def _gnss_csv(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     from sccal.logs.gnss_csv import read_gnss_csv
 
     return read_gnss_csv(path)
+
+
+def _pos(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
+    from sccal.logs.rtklib_pos import read_pos
+
+    return read_pos(path)
+
+
+def _gpsd(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
+    from sccal.logs.gpsd import read_gpsd
+
+    return read_gpsd(path)
 
 
 def _mcap(path: Path, open_channel: OpenChannel, metadata: dict[str, dict[str, str]]) -> tuple[Notice, ...]:
@@ -110,6 +123,9 @@ HEADINGS = {one.name: one.heading for one in FOLDER_FILES if one.heading is not 
 FIXES = {one.name: one.fixes for one in FOLDER_FILES if one.fixes is not None}
 """What reads each stream, by the file's name."""
 
+FOREIGN_FIXES = {".pos": _pos, "gpsd.json": _gpsd, ".gpsd": _gpsd}
+"""What reads the fixes of other programs, by the ends of their files' names, where no run file holds them."""
+
 MCAP = MessageFormat(".mcap", f"{_BREAK}; chunks that are damaged", _mcap, require_mcap)
 ROS2 = MessageFormat(".db3", _BREAK, _ros2)
 ROS1 = MessageFormat(".bag", _BREAK, _ros1)
@@ -140,6 +156,11 @@ def run_files_in(names: Collection[str]) -> dict[str, str]:
     """Which of a folder's names are run files, by the contract's name; capitals do not matter, an exact name does."""
     found = {name.lower(): name for name in sorted(names)}
     return {name: name if name in names else found[name] for name in RUN_FILES if name in found}
+
+
+def foreign_fixes(name: str) -> Callable[[Path], tuple[FixStream, tuple[Notice, ...]]] | None:
+    """What reads the fixes of a file of another program; None for any other file."""
+    return next((read for end, read in FOREIGN_FIXES.items() if name.lower().endswith(end)), None)
 
 
 def are_of_a_bag(names: Collection[str]) -> bool:
