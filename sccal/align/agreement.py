@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sccal.align.counters import reverse_notices
+from sccal.align.counters import reverse_notices, spinning_notices
 from sccal.align.path import laid_out
 from sccal.align.proportions import proportion_doubts, wheel_turn
 from sccal.align.reasons import why_apart
@@ -56,7 +56,7 @@ LAGS_S = np.arange(1.0, 15.1, 0.5)
 def check_agreement(aligned: Aligned) -> list[Notice]:
     """Doubts about stretches in which the streams do not move together; DataError where yaw and wheels never do."""
     found = [*_yaw_against_wheels(aligned), *_fixes_against_wheels(aligned)]
-    return [*found, *proportion_doubts(aligned), *reverse_notices(aligned)]
+    return [*found, *proportion_doubts(aligned), *reverse_notices(aligned), *spinning_notices(aligned)]
 
 
 def _chunks(t_s: Floats) -> list[Ints]:

@@ -46,6 +46,9 @@ STILL = 1e-3
 BACKWARDS = 0.6
 """Share of the way that the wheels say was in reverse; robots go forward more than back."""
 LEAST_TRAVEL_M = 10.0
+"""Below, the fixes do not show a radius to a per cent."""
+SPINS = 2.0
+"""So much more than its middle goes a wheel turns about it on a drive that only turns."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,24 @@ def _alike(needed_m: Floats, counted_m: Floats) -> Bools:
     """Which counted ways have the sign and about the size of the needed ones."""
     ratio = counted_m / np.where(needed_m == 0.0, np.inf, needed_m)
     return np.asarray((ratio > 1.0 / ALIKE) & (ratio < ALIKE))
+
+
+def spinning_notices(aligned: Aligned) -> list[Notice]:
+    """A doubt about drives that turn on the spot and go nowhere: they show neither radii nor the heading's zero."""
+    t_s = np.arange(*aligned.span_s, WINDOW_S)
+    way_m = float(np.abs(np.diff(np.interp(t_s, aligned.wheel_t_s, aligned.travel_m))).sum())
+    radius = aligned.vehicle.wheel_radius_m
+    half = 0.5 * radius * np.interp(t_s, aligned.wheel_t_s, aligned.right_rad - aligned.left_rad)
+    turned_m = float(np.abs(np.diff(half)).sum())
+    if way_m > LEAST_TRAVEL_M or turned_m < SPINS * way_m:
+        return []
+    what = (
+        f"drive that only turns: the middle between the wheels goes {way_m:.1f} m in all, while each wheel turns about "
+        f"it by {turned_m:.1f} m; an antenna off the middle then looks like motion. Drive at least "
+        f"{LEAST_TRAVEL_M:.0f} m straight as well"
+    )
+    doubt = f"the robot only turns, and goes {way_m:.1f} m: drive at least {LEAST_TRAVEL_M:.0f} m straight as well"
+    return [Notice(ENCODER_FILE, what, 1, "", "warning", doubt)]
 
 
 def reverse_notices(aligned: Aligned) -> list[Notice]:

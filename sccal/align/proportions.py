@@ -60,8 +60,6 @@ FACTORS = np.exp(np.arange(-1.2, 1.21, 0.04))
 """By which a yaw may have to be multiplied: 0.3 to 3.3, each 4 % further."""
 LEAST_GAIN = np.log(1.12)
 """A gain nearer to 1 is left to the fit, which measures it better."""
-STRETCH_RAD = 4.0
-"""Turned in a stretch whose shape is compared: enough to show a gain, short for drift."""
 CLEARLY_WORSE = 3.0
 
 

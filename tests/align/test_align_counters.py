@@ -69,7 +69,8 @@ def test_a_robot_that_stands_at_the_end_has_no_dead_counter() -> None:
 
 @pytest.mark.parametrize("arm", [0.5, -0.4 + 0.3j, 0.3j])
 def test_turning_on_the_spot_with_an_antenna_off_the_middle_is_no_reversed_counter(arm: complex) -> None:
-    assert align(drive(np.zeros(T_S.size), TURN_RADPS, arm)).name == "run"
+    (notice,) = (notice for notice in align(drive(np.zeros(T_S.size), TURN_RADPS, arm)).notices if notice.doubt)
+    assert "the robot only turns, and goes 0.0 m: drive at least 10 m straight" in notice.doubt
 
 
 def test_both_counters_reversed_are_told_apart_from_exchanged_ones() -> None:
