@@ -60,6 +60,8 @@ FACTORS = np.exp(np.arange(-1.2, 1.21, 0.04))
 """By which a yaw may have to be multiplied: 0.3 to 3.3, each 4 % further."""
 LEAST_GAIN = np.log(1.12)
 """A gain nearer to 1 is left to the fit, which measures it better."""
+BEYOND_IRON_RAD = np.radians(75.0)
+"""A gain adds up over the whole swing; a compass that iron bends by 35 degrees, to either side, errs by no more."""
 CLEARLY_WORSE = 3.0
 
 
@@ -215,6 +217,8 @@ def check_gain(aligned: Aligned, yaw_on_wheels: float) -> None:
     if left_over[best] > 1.0 - MUCH_EXPLAINED:
         return
     gain = 1.0 / float(FACTORS[best])
+    if abs(1.0 - 1.0 / gain) * float(np.ptp(aligned.yaw_rad)) < BEYOND_IRON_RAD:
+        return
     word = {0.5: "half as far as", 2.0: "twice as far as"}.get(round(2.0 * gain) / 2.0, "")
     shown = f" (about {word} it)" if word and abs(gain - round(2.0 * gain) / 2.0) < 0.05 * gain else ""
     raise DataError(

@@ -72,6 +72,16 @@ def test_a_gain_far_off_is_named(gain: float, word: str) -> None:
     assert word in said
 
 
+def test_a_compass_that_iron_bends_is_no_gain() -> None:
+    heading = 1.2 * np.sin(YAW_RAD)  # To and fro about north, where iron makes the slope less than one.
+    place = np.cumsum(0.7 * np.exp(1j * heading)) * 0.05
+    of = run(east_m=place.real, north_m=place.imag)
+    half = 0.5 * 0.7 * np.gradient(heading, T_S)
+    left, right = (np.cumsum(0.7 + side * half) * 0.05 / 0.08 for side in (-1.0, 1.0))
+    bent = replace(of.heading, yaw_rad=heading - 0.25 * np.sin(heading))
+    assert align(replace(of, wheels=replace(of.wheels, left_rad=left, right_rad=right), heading=bent)).name == "run"
+
+
 def test_tracks_that_skid_are_no_gain() -> None:
     of = run()
     wide = replace(of, vehicle=replace(of.vehicle, track_m=of.vehicle.track_m / 1.7))
