@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 SIDES = ("left", "right")
 COARSE_M = 2.0
 """Fixes that do not show as much in a window tell nothing of a wheel."""
+MEDIAN_OF = 5
+"""Fixes: two wrong ones together are common, three are a jump."""
 STRAIGHT_RAD = 0.2
 CLEAR_SIGMAS = 8.0
 LEAST_M = 0.15
@@ -108,7 +110,7 @@ def needed_travel(aligned: Aligned) -> NeededTravel | None:
     )
     if CLEAR_SIGMAS * sigma > COARSE_M or t_s.size < FEWEST_WINDOWS + 1:
         return None
-    place = np.interp(t_s, aligned.fix_t_s, aligned.fix_east_m + 1j * aligned.fix_north_m)
+    place = np.interp(t_s, aligned.fix_t_s, _median(aligned.fix_east_m) + 1j * _median(aligned.fix_north_m))
     yaw = np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad)
     turn = np.diff(yaw)
     along = np.diff(place) * np.exp(-0.5j * (yaw[1:] + yaw[:-1]))
@@ -127,6 +129,22 @@ def needed_travel(aligned: Aligned) -> NeededTravel | None:
     half = 0.5 * aligned.vehicle.track_m * turn
     needed = {"left": forward - half, "right": forward + half}
     return NeededTravel(t_s, needed, counted, max(LEAST_M, CLEAR_SIGMAS * sigma))
+
+
+def _median(values: Floats) -> Floats:
+    """Of MEDIAN_OF neighbours each (n,): an outlier or two together move nothing."""
+    half = MEDIAN_OF // 2
+    padded = np.pad(values, half, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_OF), axis=1))
+
+
+def _came_back(needed_m: Floats, counted_m: Floats) -> Bools:
+    """Windows (k,) that agree with the counts together with a neighbour: fixes stood aside between them."""
+    back = np.zeros(needed_m.size, dtype=np.bool_)
+    pairs = _alike(needed_m[1:] + needed_m[:-1], counted_m[1:] + counted_m[:-1])
+    back[1:] |= pairs
+    back[:-1] |= pairs
+    return back
 
 
 def _stops_at(aligned: Aligned, angle_rad: Floats) -> float | None:
@@ -168,6 +186,7 @@ def _check_direction(travel: NeededTravel, rising: list[str]) -> None:
         kept += int((clear & _alike(needed, counted)).sum())
         seen += int(clear.sum())
         lost[side] = clear & (needed < 0.0) & _alike(-needed, counted) & (side in rising)
+        lost[side] &= ~_came_back(needed, counted)
     windows = {side: int(lost[side].sum()) for side in SIDES}
     sides = [side for side in SIDES if windows[side]]
     way_m = {side: float(-travel.needed_m[side][lost[side]].sum()) for side in sides}
