@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sccal.align.proportions import WINDOW_S, wheel_turn
+from sccal.align.proportions import WINDOW_S, steady_place, wheel_turn
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.names import ENCODER_FILE
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 SIDES = ("left", "right")
 COARSE_M = 2.0
 """Fixes that do not show as much in a window tell nothing of a wheel."""
-MEDIAN_OF = 5
-"""Fixes: two wrong ones together are common, three are a jump."""
 STRAIGHT_RAD = 0.2
 CLEAR_SIGMAS = 8.0
 LEAST_M = 0.15
@@ -110,7 +108,7 @@ def needed_travel(aligned: Aligned) -> NeededTravel | None:
     )
     if CLEAR_SIGMAS * sigma > COARSE_M or t_s.size < FEWEST_WINDOWS + 1:
         return None
-    place = np.interp(t_s, aligned.fix_t_s, _median(aligned.fix_east_m) + 1j * _median(aligned.fix_north_m))
+    place = np.interp(t_s, aligned.fix_t_s, steady_place(aligned))
     yaw = np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad)
     turn = np.diff(yaw)
     along = np.diff(place) * np.exp(-0.5j * (yaw[1:] + yaw[:-1]))
@@ -129,13 +127,6 @@ def needed_travel(aligned: Aligned) -> NeededTravel | None:
     half = 0.5 * aligned.vehicle.track_m * turn
     needed = {"left": forward - half, "right": forward + half}
     return NeededTravel(t_s, needed, counted, max(LEAST_M, CLEAR_SIGMAS * sigma))
-
-
-def _median(values: Floats) -> Floats:
-    """Of MEDIAN_OF neighbours each (n,): an outlier or two together move nothing."""
-    half = MEDIAN_OF // 2
-    padded = np.pad(values, half, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_OF), axis=1))
 
 
 def _came_back(needed_m: Floats, counted_m: Floats) -> Bools:

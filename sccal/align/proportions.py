@@ -35,6 +35,8 @@ CLEAR_SIGMAS = 10.0
 """So far, in sigmas of a fix, the robot ought to go in a window."""
 CHUNK_S = 60.0
 """Yaw and fixes are compared over so long, for a yaw may drift or jump."""
+MEDIAN_OF = 5
+"""Fixes: two wrong ones together are common, three are a jump."""
 FEWEST_WINDOWS = 8
 LEAST_TRAVEL_M = 5.0
 """By the wheels in a chunk that is compared."""
@@ -141,7 +143,7 @@ def fit_of_path(
     wheel_t_s, travel, yaw = _thinned(aligned, right, left, yaw_rad)
     path = np.interp(t_s, wheel_t_s, laid_out(travel, yaw_factor * yaw))
     arm = aligned.vehicle.track_m * np.exp(1j * yaw_factor * np.interp(t_s, wheel_t_s, yaw))
-    place = np.interp(t_s, aligned.fix_t_s, aligned.fix_east_m + 1j * aligned.fix_north_m)
+    place = np.interp(t_s, aligned.fix_t_s, steady_place(aligned))
     columns = np.column_stack([np.diff(path), np.diff(arm)])
     steps: Complexes = np.asarray(np.diff(place), dtype=np.complex128)
     far = np.abs(np.diff(np.interp(t_s, wheel_t_s, travel)))
@@ -155,6 +157,16 @@ def fit_of_path(
         return None
     scales, explained = zip(*found, strict=True)
     return PathFit(float(np.median(scales)), float(np.median(explained)), len(found))
+
+
+def steady_place(aligned: Aligned) -> Complexes:
+    """Medians of MEDIAN_OF neighbouring fixes (n,), east + i north: an outlier or two together move nothing."""
+
+    def median(values: Floats) -> Floats:
+        padded = np.pad(values, MEDIAN_OF // 2, mode="edge")
+        return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_OF), axis=1))
+
+    return median(aligned.fix_east_m) + 1j * median(aligned.fix_north_m)
 
 
 def _of_chunk(columns: Complexes, steps: Complexes) -> tuple[float, float]:
