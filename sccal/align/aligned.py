@@ -51,6 +51,10 @@ MOST_PAUSE_S = 5.0
 """Of the wheels' rows on average, in runs longer than LONG_RUN_S."""
 
 
+MEDIAN_OF = 5
+"""Fixes: two wrong ones together are common, three are a jump."""
+
+
 @dataclass(frozen=True)
 class Series:
     """A further column of the log: its finite values (k,) in the log's unit, and their times on the logging clock."""
@@ -112,6 +116,16 @@ class Aligned:
     """The same of the fixes, east and north. The variances hold it; a factor that scales them must not go below it."""
     moved: Mapping[str, Moved] = field(default_factory=dict)
     """By stream ("headings", "fixes"): what was moved although it had stamps of the logging clock."""
+
+    @cached_property
+    def steady_place_m(self) -> Complexes:
+        """Medians of MEDIAN_OF neighbouring fixes (n,), east + i north: an outlier or two together move nothing."""
+
+        def median(values: Floats) -> Floats:
+            padded = np.pad(values, MEDIAN_OF // 2, mode="edge")
+            return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_OF), axis=1))
+
+        return median(self.fix_east_m) + 1j * median(self.fix_north_m)
 
     @cached_property
     def standing_s(self) -> Spans:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sccal.align.proportions import WINDOW_S, steady_place, wheel_turn
+from sccal.align.proportions import WINDOW_S, wheel_turn
 from sccal.arrays import Bools, Floats
 from sccal.errors import DataError
 from sccal.logs.names import ENCODER_FILE
@@ -108,7 +108,7 @@ def needed_travel(aligned: Aligned) -> NeededTravel | None:
     )
     if CLEAR_SIGMAS * sigma > COARSE_M or t_s.size < FEWEST_WINDOWS + 1:
         return None
-    place = np.interp(t_s, aligned.fix_t_s, steady_place(aligned))
+    place = np.interp(t_s, aligned.fix_t_s, aligned.steady_place_m)
     yaw = np.interp(t_s, aligned.heading_t_s, aligned.yaw_rad)
     turn = np.diff(yaw)
     along = np.diff(place) * np.exp(-0.5j * (yaw[1:] + yaw[:-1]))

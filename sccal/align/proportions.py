@@ -35,8 +35,6 @@ CLEAR_SIGMAS = 10.0
 """So far, in sigmas of a fix, the robot ought to go in a window."""
 CHUNK_S = 60.0
 """Yaw and fixes are compared over so long, for a yaw may drift or jump."""
-MEDIAN_OF = 5
-"""Fixes: two wrong ones together are common, three are a jump."""
 FEWEST_WINDOWS = 8
 LEAST_TRAVEL_M = 5.0
 """By the wheels in a chunk that is compared."""
@@ -123,6 +121,12 @@ def shares_of_turning(aligned: Aligned) -> Shares | None:
     return Shares(float(found[0]), float(found[1]), float(said @ yaw) / size if size > 0.0 else 0.0, sigma)
 
 
+def _known_shares(aligned: Aligned) -> Shares | None:
+    """The same where they are clear and both wheels roll forward."""
+    shares = shares_of_turning(aligned)
+    return shares if shares is not None and shares.clear and min(shares.right, shares.left) > 0.0 else None
+
+
 def wheel_turn(aligned: Aligned, t_s: Floats) -> Floats:
     """Turning by the wheels (rad, nominal radius and track) up to each time."""
     difference = aligned.right_rad - aligned.left_rad
@@ -143,7 +147,7 @@ def fit_of_path(
     wheel_t_s, travel, yaw = _thinned(aligned, right, left, yaw_rad)
     path = np.interp(t_s, wheel_t_s, laid_out(travel, yaw_factor * yaw))
     arm = aligned.vehicle.track_m * np.exp(1j * yaw_factor * np.interp(t_s, wheel_t_s, yaw))
-    place = np.interp(t_s, aligned.fix_t_s, steady_place(aligned))
+    place = np.interp(t_s, aligned.fix_t_s, aligned.steady_place_m)
     columns = np.column_stack([np.diff(path), np.diff(arm)])
     steps: Complexes = np.asarray(np.diff(place), dtype=np.complex128)
     far = np.abs(np.diff(np.interp(t_s, wheel_t_s, travel)))
@@ -157,16 +161,6 @@ def fit_of_path(
         return None
     scales, explained = zip(*found, strict=True)
     return PathFit(float(np.median(scales)), float(np.median(explained)), len(found))
-
-
-def steady_place(aligned: Aligned) -> Complexes:
-    """Medians of MEDIAN_OF neighbouring fixes (n,), east + i north: an outlier or two together move nothing."""
-
-    def median(values: Floats) -> Floats:
-        padded = np.pad(values, MEDIAN_OF // 2, mode="edge")
-        return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_OF), axis=1))
-
-    return median(aligned.fix_east_m) + 1j * median(aligned.fix_north_m)
 
 
 def _of_chunk(columns: Complexes, steps: Complexes) -> tuple[float, float]:
@@ -242,8 +236,8 @@ def check_gain(aligned: Aligned, yaw_on_wheels: float) -> None:
 
 def check_sides(aligned: Aligned) -> None:
     """Raise DataError where one counter counts so much more than the other that no pair of wheels drives so."""
-    shares = shares_of_turning(aligned)
-    if shares is None or not shares.clear or min(shares.right, shares.left) <= 0.0:
+    shares = _known_shares(aligned)
+    if shares is None:
         return
     if abs(np.log(shares.right / shares.left)) > np.log(LOST_RADII):
         raise DataError(f"{ENCODER_FILE}: {_unequal(shares.right / shares.left)}")
@@ -251,8 +245,8 @@ def check_sides(aligned: Aligned) -> None:
 
 def check_proportions(aligned: Aligned) -> None:
     """Raise DataError where radii and track together cannot be what is declared, or fixes follow another drive."""
-    shares = shares_of_turning(aligned)
-    if shares is None or not shares.clear or min(shares.right, shares.left) <= 0.0:
+    shares = _known_shares(aligned)
+    if shares is None:
         return
     fit = fit_of_path(aligned, shares.right, shares.left)
     if fit is None:
@@ -288,8 +282,8 @@ def _check_common_scale(aligned: Aligned, shares: Shares, track: float) -> None:
 
 def proportion_doubts(aligned: Aligned) -> list[Notice]:
     """Doubts about sizes that are far from the nominal ones, for the verdict."""
-    shares = shares_of_turning(aligned)
-    if shares is None or not shares.clear or min(shares.right, shares.left) <= 0.0:
+    shares = _known_shares(aligned)
+    if shares is None:
         return []
     ratio = shares.right / shares.left
     if abs(np.log(ratio)) > np.log(UNEQUAL_RADII):

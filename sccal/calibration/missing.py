@@ -47,12 +47,8 @@ class Lacking:
 
     def widened(self, covariance: Floats) -> Floats:
         """The covariance (4, 4) of the constants, owning up to what is missing; an offset that is held stays held."""
-        free = np.flatnonzero(np.diag(covariance) > 0.0)
-        rows = np.ix_(free, free)
-        widened = covariance.copy()
-        widened[rows] = at_least(covariance[rows], np.diag(self.sigmas[free] ** 2))
-        widened[rows] += np.outer(self.apart[free], self.apart[free])
-        return widened
+        apart = np.where(np.diag(covariance) > 0.0, self.apart, 0.0)
+        return np.asarray(at_least(covariance, np.diag(self.sigmas**2)) + np.outer(apart, apart))
 
 
 def look_for_missing(problem: RunProblem, values: Floats, heading_rate_hz: float) -> Lacking:

@@ -45,13 +45,7 @@ class Stretches:
         """The covariance (4, 4) of constants and offset as far as the stretches leave it (Wedderburn 1974)."""
         if not self.contradict:
             return covariance
-        other = np.zeros(4)
-        other[:3] = np.diag(self.robust)
-        free = np.flatnonzero(np.diag(covariance) > 0.0)
-        rows = np.ix_(free, free)
-        widened = covariance.copy()
-        widened[rows] = self.chi2_per_dof * at_least(covariance[rows], np.diag(other[free]))
-        return widened
+        return self.chi2_per_dof * at_least(covariance, np.diag([*np.diag(self.robust), 0.0]))
 
     @property
     def notices(self) -> tuple[Notice, ...]:

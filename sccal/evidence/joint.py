@@ -411,7 +411,11 @@ def between_runs(likelihoods: Sequence[Gaussian], at: Floats, covariance: Floats
 
 
 def at_least(covariance: Floats, other: Floats) -> Floats:
-    """The covariance with every sigma raised to the other's where that is larger, correlations kept."""
+    """The covariance with every sigma raised to the other's where that is larger, correlations kept.
+
+    What is held, without any variance, stays held.
+    """
     sigma = np.sqrt(np.diag(covariance))
-    raised = np.maximum(sigma, np.sqrt(np.maximum(np.diag(other), 0.0))) / sigma
+    larger = np.maximum(sigma, np.sqrt(np.maximum(np.diag(other), 0.0)))
+    raised = np.divide(larger, sigma, out=np.ones_like(sigma), where=sigma > 0.0)
     return np.asarray(covariance * np.outer(raised, raised))
