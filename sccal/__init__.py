@@ -18,6 +18,7 @@ Rooms, ground floor first; imports point down only
 0   compiled     Compilation to machine code, with a cache that cannot go stale.
 1   geodesy      The local tangent plane: latitude and longitude to metres, and back.
 1   randomness   Named streams of random numbers, and the errors made of them.
+1   processes    Work in processes of this machine, replaced where the system kills one.
 1   logs         From the bytes of a log to streams, and back.
 2   results      Every type of result, and the one way of writing and reading them.
 3   align        From streams to one timeline of events on one clock.

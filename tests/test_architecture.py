@@ -18,7 +18,7 @@ PACKAGE = Path(sccal.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 FLOORS = (
     {"errors", "arrays", "compiled"},
-    {"geodesy", "randomness", "logs"},
+    {"geodesy", "randomness", "processes", "logs"},
     {"results"},
     {"align", "convert", "simulate", "degrade"},
     {"effects"},

@@ -107,7 +107,9 @@ def test_options_that_cannot_be(option: tuple[str, str], folder: Path, tmp_path:
 def test_diagnose_hands_the_options_on(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
-    def note(paths: object, out: object, options: object, read: ReadOptions) -> tuple[list[object], list[object]]:
+    def note(
+        paths: object, out: object, options: object, read: ReadOptions, workers: object
+    ) -> tuple[list[object], list[object]]:
         seen.append(read)
         return [], []
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Protocol
 
 from sccal.batch.folder import finished, write_run
-from sccal.batch.processes import Here, Workers
 from sccal.batch.record import RunRecord
 from sccal.batch.remote import find_sources
 from sccal.batch.tasks import AlsoWritten, CalibrateRun, Done, Source
@@ -23,6 +22,7 @@ from sccal.errors import Failure, Interrupted, SccalError, UsageError
 from sccal.filter.forward import say_if_compiling
 from sccal.logs.options import ReadOptions
 from sccal.logs.run import RunSource
+from sccal.processes import Here, Workers
 from sccal.report.write import begin_loading, write_vehicle
 from sccal.results.calibration import Calibration, VehicleCalibration
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
-from sccal.batch.processes import Workers
 from sccal.batch.record import RunRecord
 from sccal.batch.remote import fetched
 from sccal.batch.tasks import CalibrateRun, JudgeByOthers, LineariseAgain, one_thread, prepared_again
@@ -15,6 +14,7 @@ from sccal.calibration.by_the_others import SaidByOthers, held_out_of
 from sccal.calibration.combine import combine, combined, only_run
 from sccal.calibration.shared import MAX_ROUNDS, SharedFit, SharedLikelihood, far_off, pooled, stayed
 from sccal.errors import SccalError
+from sccal.processes import Workers
 from sccal.results.calibration import HeldOut, OutageWindow, VehicleCalibration
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +20,7 @@ from sccal.arrays import Floats
 from sccal.calibration.outage import isolated, run_with_outages, summarise
 from sccal.evidence.joint import Places, fit_jointly, names_of
 from sccal.evidence.model import Model
-from sccal.evidence.parallel import each
+from sccal.evidence.parallel import each_apart
 from sccal.filter.forward import ForwardPass, fix_nis
 from sccal.filter.iterate import At, RunProblem
 from sccal.filter.layout import BASE_STATES, CONSTANTS, OFFSET, THETA
@@ -71,9 +72,9 @@ class Judged:
 def judge(model: Model, window_s: float) -> Judged:
     """Hold out every run, or every stretch of the only one, in its turn."""
     if len(model.problems) > 1:
-        parts = each(lambda run: _on_others(model, run, window_s), range(len(model.problems)))
+        parts = each_apart(partial(_on_others, model, window_s), range(len(model.problems)))
     else:
-        parts = each(lambda stretch: _on_a_stretch(model, stretch, window_s), stretches(model.problems[0]))
+        parts = each_apart(partial(_on_a_stretch, model, window_s), stretches(model.problems[0]))
     return Judged(
         windows=tuple(window for part in parts for window in part.windows),
         window_s=window_s,
@@ -109,7 +110,7 @@ def stretches(problem: RunProblem) -> list[tuple[float, float]]:
     return [(float(a), float(b)) for a, b in pairwise(edges)]
 
 
-def _on_others(model: Model, run: int, window_s: float) -> Judged:
+def _on_others(model: Model, window_s: float, run: int) -> Judged:
     others = [k for k in range(len(model.problems)) if k != run]
     fit = fit_jointly([model.problems[k] for k in others], [model.at(k) for k in others], ROUNDS, with_stretches=True)
     problem = model.problems[run]
@@ -159,7 +160,7 @@ def expected_of_one_more(values: Floats) -> tuple[float, float]:
     return float(values.mean()), float(values.var(ddof=1)) * (1.0 + 1.0 / count) * (1.0 + 2.0 / (count - 1))
 
 
-def _on_a_stretch(model: Model, stretch: tuple[float, float], window_s: float) -> Judged:
+def _on_a_stretch(model: Model, window_s: float, stretch: tuple[float, float]) -> Judged:
     problem = model.problems[0]
     blind = replace(problem, timeline=without(problem.timeline, stretch))
     fit = fit_jointly([blind], [model.at(0)], ROUNDS, with_stretches=True)

@@ -20,6 +20,10 @@ def diagnose(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path("out"),
     window: Annotated[float, typer.Option(help="Length of the outage windows, s.", min=1.0)] = 30.0,
     heading_rate: Annotated[float, typer.Option(help="Use at most so many AHRS readings per second.", min=0.1)] = 10.0,
+    jobs: Annotated[
+        int | None,
+        typer.Option(help="Processes that share the runs; one on each core without it.", min=1, show_default=False),
+    ] = None,
     *,
     read: Reading,
 ) -> None:
@@ -27,13 +31,21 @@ def diagnose(
     from sccal.logs.first_look import require_any_log
 
     require_any_log(paths)
+    from sccal.cli.workers import one_thread_each, workers_among
+
+    one_thread_each()
+    workers = workers_among(paths, jobs)
     from sccal.batch.diagnosing import diagnose_paths
     from sccal.calibration.options import CalibrationOptions
     from sccal.report.diagnosis.text import diagnosis_text, next_line
     from sccal.results.files import MODEL_FILE
 
     options = CalibrationOptions(outage_window_s=window, heading_rate_hz=heading_rate)
-    diagnosed, failures = diagnose_paths(paths, out, options, read.options())
+    try:
+        diagnosed, failures = diagnose_paths(paths, out, options, read.options(), workers)
+    finally:
+        if workers is not None:
+            workers.close()
     width = columns()
     alone = len(diagnosed) == 1
     for diagnosis, page in diagnosed:

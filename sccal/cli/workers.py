@@ -7,13 +7,16 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from sccal.batch.processes import ONE_THREAD, Here, Processes, Workers
 from sccal.errors import UsageError
 from sccal.logs.formats import MESSAGE_SUFFIXES, RUN_FILES
 from sccal.logs.names import BAG_FILE
+from sccal.processes import ONE_THREAD, Here, Processes, Workers
 
 _RUN_FILES = {*RUN_FILES, BAG_FILE}
 _MOST_FOLDERS = 10_000
+CALIBRATING = ("sccal.batch.tasks", "sccal.report.run.page")
+DIAGNOSING = ("sccal.diagnose.diagnose",)
+"""What a process loads while it waits for its first task."""
 _SHORT_BYTES = 4_000_000
 """Of the files of a run of five minutes or so."""
 
@@ -35,7 +38,15 @@ def workers_for(paths: Sequence[Path | str], jobs: int | None, scheduler: str = 
     # A few short runs are done sooner here than another process has loaded what they need.
     worth = (runs + size_bytes // _SHORT_BYTES) // 2
     count = min(runs, worth, cores) if jobs is None else min(jobs, runs)
-    return Processes(count) if count > 1 else Here()
+    return Processes(count, CALIBRATING) if count > 1 else Here()
+
+
+def workers_among(paths: Sequence[Path], jobs: int | None) -> Workers | None:
+    """Processes among which the runs of a vehicle are shared; None where threads of this process do as well."""
+    most = usable_cores() if jobs is None else jobs
+    runs, _ = runs_and_bytes(paths, most)
+    count = min(runs, most)
+    return Processes(count, DIAGNOSING) if count > 1 else None
 
 
 def usable_cores() -> int:

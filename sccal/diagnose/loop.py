@@ -21,7 +21,6 @@ from sccal.evidence.extension import Free
 from sccal.evidence.held_out_gain import WHOLE_RUNS, held_out_gain
 from sccal.evidence.joint import Key
 from sccal.evidence.model import Accepted, Model, Trust, bare_model, refitted
-from sccal.evidence.parallel import each
 from sccal.evidence.posterior import PRICE_NATS, WIDEST, Posterior
 from sccal.evidence.saturated import Saturated, posterior_of, saturate
 from sccal.filter.noise import Reach
@@ -200,8 +199,7 @@ def _moments(loop: Loop) -> list[Found]:
     if loop.model.trust is Trust.PATH:
         return []
     known = [one.free.effect.name for one in loop.moments]
-    of_runs = each(lambda run: find_moments(loop.model, run, known), range(len(loop.model.problems)))
-    for rough in sorted((one for several in of_runs for one in several), key=lambda one: -one.gain_nats):
+    for rough in find_moments(loop.model, known):
         moment = settled(loop.model, rough)
         if moment.stands_out:
             loop.shape_sigmas[moment.free.key] = dict(moment.shape_sigmas)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +23,7 @@ from sccal.effects.effect import Effect
 from sccal.evidence.candidates import Candidates
 from sccal.evidence.extension import Free, FreeEffects, plain_form, view_run
 from sccal.evidence.model import Accepted, Model
-from sccal.evidence.parallel import each
+from sccal.evidence.parallel import each_apart
 from sccal.evidence.posterior import WIDEST
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, whole_nll
@@ -200,16 +201,22 @@ def _given_zero(mean: Floats, covariance: Floats, kept: Bools) -> tuple[float, F
     )
 
 
-def find_moments(model: Model, run: int, known: Sequence[str]) -> list[Found]:
-    """Every effect of a moment or a place that stands out in one run and is not known, the largest gain first.
+def find_moments(model: Model, known: Sequence[str]) -> list[Found]:
+    """Every effect of a moment or a place that stands out in some run and is not known, the largest gain first.
 
     Roughly: see ``settled``.
     """
-    problem = model.problems[run]
+    tasks = [(run, problem, model.at(run)) for run, problem in enumerate(model.problems)]
+    of_runs = each_apart(partial(_moments_of_run, known), tasks)
+    return sorted((one for several in of_runs for one in several), key=lambda one: -one.gain_nats)
+
+
+def _moments_of_run(known: Sequence[str], task: tuple[int, RunProblem, At]) -> list[Found]:
+    run, problem, at = task
     start_s, end_s = problem.aligned.span_s
     if end_s - start_s < 4.0 * EDGE_S:
         return []
-    scan = Scan(problem, model.at(run))
+    scan = Scan(problem, at)
     grid = np.linspace(EDGE_S, end_s - start_s - EDGE_S, GRID)
     found: list[Found] = []
     for stream, innovations in scan.suspicious.items():
@@ -219,7 +226,7 @@ def find_moments(model: Model, run: int, known: Sequence[str]) -> list[Found]:
         for effect in here:
             if effect.search == "place":
                 found += _search_place(scan, run, effect, suspects, grid)
-    return sorted((one for one in found if one.stands_out), key=lambda one: -one.gain_nats)
+    return [one for one in found if one.stands_out]
 
 
 def settled(model: Model, rough: Found) -> Found:
@@ -238,19 +245,43 @@ def best_forms(model: Model, candidates: Candidates, kept: Sequence[Accepted]) -
     """
     alike = ALIKE_NATS * max(model.fit.misfit, 1.0)
     mine = {one.free.effect.name: one for one in kept if one.run is None}
-    scans: list[Scan] = []
-    chosen = []
-    for name, forms in candidates.forms.items():
-        if name in mine:
-            chosen.append(mine[name])
-            continue
-        best = forms[0]
-        if len(forms) > 1:
-            scans = scans or each(lambda run: Scan(model.problems[run], model.at(run)), range(len(model.problems)))
-            gains = [sum(scan.trial(free.effect, free.shapes, 1.0)[0] for scan in scans) for free in forms]
-            best = forms[int(np.argmax(gains))] if max(gains) - gains[0] > alike else best
-        chosen.append(Accepted(best))
-    return chosen
+    asked = {name: forms for name, forms in candidates.forms.items() if len(forms) > 1 and name not in mine}
+    tries = [_Try(replace(free, prior_scale=1.0)) for forms in asked.values() for free in forms]
+    ends = np.cumsum([len(forms) for forms in asked.values()])[:-1]
+    tasks = [(problem, model.at(run), tries) for run, problem in enumerate(model.problems)]
+    gains = np.split(_gains(tasks), ends) if asked else []
+    best = {name: forms[0] for name, forms in candidates.forms.items()}
+    for (name, forms), of_forms in zip(asked.items(), gains, strict=True):
+        if of_forms.max() - of_forms[0] > alike:
+            best[name] = forms[int(np.argmax(of_forms))]
+    return [mine.get(name, Accepted(free)) for name, free in best.items()]
+
+
+@dataclass(frozen=True)
+class _Try:
+    """One more effect in a run's filter, and the values (m,) around which it is taken."""
+
+    free: Free
+    around: Floats | None = None
+
+
+_Tries = tuple[RunProblem, At, Sequence[_Try]]
+
+
+def _gains(tasks: Sequence[_Tries]) -> Floats:
+    """What each of n tries gains in all runs together, nats (n,)."""
+    return np.asarray(np.sum(each_apart(_gains_in_run, tasks), axis=0))
+
+
+def _gains_in_run(task: _Tries) -> Floats:
+    problem, at, tries = task
+    scan = Scan(problem, at)
+
+    def gain(one: _Try) -> float:
+        return scan.trial(one.free.effect, one.free.shapes, one.free.prior_scale, one.around)[0]
+
+    with at_once() as map_at_once:
+        return np.array(list(map_at_once(gain, tries)))
 
 
 def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float]]:
@@ -258,19 +289,17 @@ def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float
 
     Where that is not clearly likelier than its plain form the shapes are those of that.
     """
-    scans = [_without(model, run, accepted) for run in range(len(model.problems))]
+    runs = [_without(model, run, accepted) for run in range(len(model.problems))]
     shapes = dict(accepted.free.shapes)
-    effect, scale = accepted.free.effect, accepted.free.prior_scale
-    bounds = {one.name: (one.lower, one.upper) for one in effect.parameters if one.shape}
-
+    bounds = {one.name: (one.lower, one.upper) for one in accepted.free.effect.parameters if one.shape}
     names = [(accepted.key, one.name) for one in accepted.free.parameters]
-    known = [model.values(run) for run in range(len(scans))]
+    known = [model.values(run) for run in range(len(runs))]
     around = [np.array([values[name] for name in names]) for values in known]
 
-    def gain(tried: Mapping[str, float]) -> float:
-        with at_once() as map_at_once:
-            pairs = list(zip(scans, around, strict=True))
-            return sum(map_at_once(lambda pair: pair[0].trial(effect, tried, scale, pair[1])[0], pairs))
+    def gains_at(several: Sequence[Mapping[str, float]]) -> Floats:
+        forms = [replace(accepted.free, shapes=tried) for tried in several]
+        pairs = zip(runs, around, strict=True)
+        return _gains([(*run, [_Try(free, values) for free in forms]) for run, values in pairs])
 
     sigmas: dict[str, float] = {}
     for name, (low, high) in bounds.items():
@@ -279,13 +308,15 @@ def refined(model: Model, accepted: Accepted) -> tuple[Accepted, dict[str, float
         for _ in range(ZOOMS):
             middle = max(shapes[name], least)
             points = np.unique(np.clip([shapes[name], low, *(middle * np.array(AROUND) ** reach)], low, high))
-            gains = np.array([gain({**shapes, name: float(point)}) for point in points])
+            gains = gains_at([{**shapes, name: float(point)} for point in points])
             shapes[name] = float(points[int(np.argmax(gains))])
             reach *= 0.4
         sigmas[name] = shape_sigma(points, gains)
-    plain = plain_form(effect)
-    if plain is not None and gain(shapes) - gain(plain.shapes) <= ALIKE_NATS * max(model.fit.misfit, 1.0):
-        shapes = dict(plain.shapes)
+    plain = plain_form(accepted.free.effect)
+    if plain is not None:
+        here, there = gains_at([shapes, plain.shapes])
+        if here - there <= ALIKE_NATS * max(model.fit.misfit, 1.0):
+            shapes = dict(plain.shapes)
     return replace(accepted, free=replace(accepted.free, shapes=shapes)), sigmas
 
 
@@ -305,14 +336,14 @@ def shape_sigma(points: Floats, gains: Floats) -> float:
     return float(max(falls, default=float("nan")))
 
 
-def _without(model: Model, run: int, accepted: Accepted) -> Scan:
-    """One run's scan with an effect of the model taken out."""
+def _without(model: Model, run: int, accepted: Accepted) -> tuple[RunProblem, At]:
+    """One run with an effect of the model taken out."""
     problem, at = model.problems[run], model.at(run)
     assert isinstance(problem.extension, FreeEffects)
     keep = np.array([free.key != accepted.key for free in problem.extension.effects for _ in free.parameters])
     rest = tuple(free for free in problem.extension.effects if free.key != accepted.key)
     extension = FreeEffects(rest) if rest else None
-    return Scan(replace(problem, extension=extension), At(at.constants, at.values[keep], at.path))
+    return replace(problem, extension=extension), At(at.constants, at.values[keep], at.path)
 
 
 def _search_time(scan: Scan, run: int, effects: Sequence[Effect], suspects: Floats, grid: Floats) -> list[Found]:

@@ -55,6 +55,10 @@ class Pattern(Effect):
             Parameter(f"p{k}", unit, sigma, -REACH * sigma, REACH * sigma, matters=0.05 * sigma) for k in range(count)
         )
 
+    def __reduce__(self) -> tuple[Callable[[str], Pattern], tuple[str]]:
+        """To another process by name: what makes the columns cannot be sent."""
+        return _named, (self.name,)
+
     def columns(self, drive: DriveView, at: Mapping[str, float]) -> tuple[Column, ...]:
         return tuple(
             Column(one.name, self.port, np.asarray(values, dtype=np.float64))
@@ -160,3 +164,7 @@ PATTERNS: tuple[Pattern, ...] = (
     *_turn_patterns(),
     *_other_patterns(),
 )
+
+
+def _named(name: str) -> Pattern:
+    return next(one for one in PATTERNS if one.name == name)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Protocol
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from sccal.arrays import Floats, Ints
 from sccal.evidence.extension import FreeEffects
-from sccal.evidence.parallel import each
+from sccal.evidence.parallel import each_apart
 from sccal.filter.forward import ForwardPass, numeric_limits
 from sccal.filter.iterate import MOST_HALVINGS, WORSE_NATS, At, RunProblem, whole_nll
 from sccal.filter.layout import BASE_STATES, CONSTANTS
@@ -354,17 +354,19 @@ def _round(
     centre: Floats,
     with_stretches: bool = False,
 ) -> _Round:
-    def likelihood(k: int) -> RunLikelihood:
-        theta = values[places.of_run[k]]
-        return RunLikelihood.of(problems[k], At(Constants.of(theta), theta[3:], paths[k]), with_stretches)
-
-    runs = each(likelihood, range(len(problems)))
+    each_at = (values[rows] for rows in places.of_run)
+    at = [At(Constants.of(theta), theta[3:], path) for theta, path in zip(each_at, paths, strict=True)]
+    runs = each_apart(partial(_likelihood, with_stretches), zip(problems, at, strict=True))
     precision, vector = prior.copy(), prior @ centre
     for one, rows in zip(runs, places.of_run, strict=True):
         precision[np.ix_(rows, rows)] += one.precision
         vector[rows] += one.vector
     covariance = _inverse(precision)
     return _Round(values, list(paths), tuple(runs), covariance @ vector, covariance)
+
+
+def _likelihood(with_stretches: bool, run: tuple[RunProblem, At]) -> RunLikelihood:
+    return RunLikelihood.of(*run, with_stretches)
 
 
 def _prior(problems: Sequence[RunProblem], places: Places) -> tuple[Floats, Floats]:

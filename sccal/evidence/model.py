@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from sccal.arrays import Floats
 from sccal.effects.view import DriveView
 from sccal.evidence.extension import Free, FreeEffects, name_in, view_run
 from sccal.evidence.joint import JointFit, fit_jointly, names_of
-from sccal.evidence.parallel import each
+from sccal.evidence.parallel import each_apart
 from sccal.filter.forward import ForwardPass
 from sccal.filter.iterate import At, RunProblem, iterate, likeliest
 from sccal.filter.noise import (
@@ -166,22 +167,24 @@ def bare_model(
     Raises:
         DataError: where a run hardly moves.
     """
-    soft = replace(options, soft_gate=True)
-
-    def prepared(aligned: Aligned) -> tuple[RunProblem, At]:
-        start = find_start(aligned)
-        if trust is Trust.PATH:
-            noise, _ = misfit_noise(aligned, start, options)
-        else:
-            noise, _ = estimate_noise(aligned, start, options, heading_rate_hz)
-        problem = RunProblem(aligned, timeline_of(aligned, heading_rate_hz, trust), start, noise, soft)
-        values, found = iterate(problem, problem.at_centre())
-        return problem, At(Constants.of(values), values[4:], found)
-
-    ready = each(prepared, runs)
+    ready = each_apart(partial(_prepared_bare, options, heading_rate_hz, trust), runs)
     problems = [problem for problem, _ in ready]
     fit = fit_jointly(problems, [first for _, first in ready], ROUNDS, with_stretches=True)
     return Model((), tuple(problems), fit, heading_rate_hz)
+
+
+def _prepared_bare(
+    options: FilterOptions, heading_rate_hz: float, trust: Trust, aligned: Aligned
+) -> tuple[RunProblem, At]:
+    start = find_start(aligned)
+    if trust is Trust.PATH:
+        noise, _ = misfit_noise(aligned, start, options)
+    else:
+        noise, _ = estimate_noise(aligned, start, options, heading_rate_hz)
+    timeline = timeline_of(aligned, heading_rate_hz, trust)
+    problem = RunProblem(aligned, timeline, start, noise, replace(options, soft_gate=True))
+    values, found = iterate(problem, problem.at_centre())
+    return problem, At(Constants.of(values), values[4:], found)
 
 
 def refitted(
@@ -210,41 +213,45 @@ def refitted(
         Passes over every run at most.
     """
 
-    def prepared(k: int) -> tuple[RunProblem, At]:
-        before = model.problems[k]
+    tasks = []
+    for k, before in enumerate(model.problems):
         extension = extension_of(accepted, k)
         problem = replace(before, extension=extension, noise=noises[k] if noises else before.noise)
-        first = likeliest(problem, [_carried(model, k, extension), *starts[k : k + 1]])
-        if reach is not None:
-            # Under the noise of a model that lacks the effects they come near, so that the search starts from there.
-            values, found = iterate(problem, first, ROUNDS_BEFORE, with_sigmas=False)
-            first = At(Constants.of(values), values[4:], found)
-            noise, settled = _noise(model, before, extension, first, [problem.noise, before.noise], reach)
-            problem = replace(problem, noise=noise)
-            # The path over the whole run: the search saw a stretch of it.
-            first = At(settled.constants, settled.values, first.path)
-        return problem, first
-
-    ready = each(prepared, range(len(model.problems)))
-    problems = [problem for problem, _ in ready]
+        tasks.append(_Refit(problem, before.noise, (_carried(model, k, extension), *starts[k : k + 1])))
+    ready = each_apart(partial(_prepared, reach, model.trust, model.heading_rate_hz), tasks)
+    problems = [replace(task.problem, noise=noise) for task, (noise, _) in zip(tasks, ready, strict=True)]
     fit = fit_jointly(problems, [first for _, first in ready], rounds, with_stretches=True)
     return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz)
 
 
-def _noise(
-    model: Model,
-    problem: RunProblem,
-    extension: FreeEffects | None,
-    first: At,
-    near: Sequence[Noise],
-    reach: Reach,
-) -> tuple[Noise, At]:
-    """A run's noise beside some effects, under the model's trust."""
-    if model.trust is Trust.PATH:
-        return misfit_noise(problem.aligned, problem.start, problem.options, extension, first)
-    return estimate_noise(
-        problem.aligned, problem.start, problem.options, model.heading_rate_hz, extension, first, near, reach
-    )
+@dataclass(frozen=True)
+class _Refit:
+    """One run with other effects, and what is known of it."""
+
+    problem: RunProblem
+    """Under a noise to start from."""
+    noise_before: Noise
+    starts: tuple[At, ...]
+    """Where its fit may start."""
+
+
+def _prepared(reach: Reach | None, trust: Trust, heading_rate_hz: float, task: _Refit) -> tuple[Noise, At]:
+    """A run's noise, and where its fit starts."""
+    problem = task.problem
+    first = likeliest(problem, task.starts)
+    if reach is None:
+        return problem.noise, first
+    # Under the noise of a model that lacks the effects they come near, so that the search starts from there.
+    values, found = iterate(problem, first, ROUNDS_BEFORE, with_sigmas=False)
+    first = At(Constants.of(values), values[4:], found)
+    run = problem.aligned, problem.start, problem.options
+    if trust is Trust.PATH:
+        noise, settled = misfit_noise(*run, problem.extension, first)
+    else:
+        near = [problem.noise, task.noise_before]
+        noise, settled = estimate_noise(*run, heading_rate_hz, problem.extension, first, near, reach)
+    # The path over the whole run: the search saw a stretch of it.
+    return noise, At(settled.constants, settled.values, first.path)
 
 
 def _carried(model: Model, run: int, extension: FreeEffects | None) -> At:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from sccal.batch.processes import Here, Processes
 from sccal.cli import workers
 from sccal.errors import UsageError
+from sccal.processes import Here, Processes
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def counted(monkeypatch):
     """Processes that only say how many they would be, on four cores."""
 
     class Counted(Processes):
-        def __init__(self, count):
+        def __init__(self, count, loads):
             self.count = count
 
     monkeypatch.setattr(workers, "Processes", Counted)

@@ -19,7 +19,7 @@ from tests.evidence.logs import bare
 def found(*texts: str, path: str = "general") -> tuple[Found, ...]:
     """Everything that stands out in one log, the first as it enters a model."""
     model = bare(*texts, path=path)
-    first, *others = [*find_moments(model, 0, ()), None]
+    first, *others = [*find_moments(model, ()), None]
     return () if first is None else (settled(model, first), *others[:-1])
 
 
@@ -74,13 +74,13 @@ def test_a_local_field_has_its_place_its_size_and_its_sign():
 
 
 def test_what_is_known_already_is_not_looked_for():
-    again = find_moments(bare("heading_step=5.0,100.0"), 0, ("heading_step",))
+    again = find_moments(bare("heading_step=5.0,100.0"), ("heading_step",))
     assert "heading_step" not in [one.free.effect.name for one in again]
 
 
 def test_beside_an_effect_that_is_in_the_model_nothing_stands_out():
     model = refitted(bare("lever_arm=0.3,-0.1"), [Accepted(Free(CATALOGUE["lever_arm"]))])
-    assert find_moments(model, 0, ()) == []
+    assert find_moments(model, ()) == []
 
 
 # How well a shape is known

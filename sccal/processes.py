@@ -10,7 +10,7 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any, Protocol, TypeVar
@@ -54,34 +54,42 @@ class Here:
 
 
 class Processes:
-    """Work in processes that are started at once and load what the work needs meanwhile."""
+    """Work in processes that are started at once and load the modules that the work needs meanwhile."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, count: int, loads: Sequence[str] = ()) -> None:
         self._idle: list[_Worker] = []
         self._busy: dict[_Worker, int] = {}
         self._count = count
+        self._loads = tuple(loads)
         for _ in range(count):
-            self._idle.append(_Worker())
+            self._idle.append(_Worker(self._loads))
 
     def results(self, tasks: Sequence[Callable[[], Result]]) -> Iterator[tuple[int, Result | SccalError]]:
-        """As they are done. The task that a process was killed with is told; another process takes its place."""
+        """As they are done. The task that a process was killed with is told; another process takes its place.
+
+        Where the caller stops asking, or a task cannot be sent, what is still being done is not finished.
+        """
         waiting = deque(enumerate(tasks))
-        while waiting or self._busy:
-            while waiting and len(self._busy) < self._count:
-                worker = self._idle.pop() if self._idle else _Worker()
-                place, task = waiting.popleft()
-                self._busy[worker] = place
-                worker.begin(task)
-            ready = wait([worker.connection for worker in self._busy])
-            for worker in [one for one in self._busy if one.connection in ready]:
-                place = self._busy.pop(worker)
-                try:
-                    result = worker.connection.recv()
-                except (EOFError, OSError):
-                    yield place, worker.death()
-                    continue
-                self._idle.append(worker)
-                yield place, result
+        try:
+            while waiting or self._busy:
+                while waiting and len(self._busy) < self._count:
+                    worker = self._idle.pop() if self._idle else _Worker(self._loads)
+                    place, task = waiting.popleft()
+                    self._busy[worker] = place
+                    worker.begin(task)
+                ready = wait([worker.connection for worker in self._busy])
+                for worker in [one for one in self._busy if one.connection in ready]:
+                    place = self._busy.pop(worker)
+                    try:
+                        result = worker.connection.recv()
+                    except (EOFError, OSError):
+                        yield place, worker.death()
+                        continue
+                    self._idle.append(worker)
+                    yield place, result
+        finally:
+            self._stop(self._busy)
+            self._busy = {}
 
     def close(self) -> None:
         """The processes end by themselves when nobody speaks to them any more."""
@@ -93,20 +101,24 @@ class Processes:
 
     def stop(self) -> None:
         """Kill them."""
-        for worker in (*self._busy, *self._idle):
-            worker.process.kill()
-        for worker in (*self._busy, *self._idle):
-            worker.end()
+        self._stop([*self._busy, *self._idle])
         self._busy, self._idle = {}, []
+
+    @staticmethod
+    def _stop(workers: Collection[_Worker]) -> None:
+        for worker in workers:
+            worker.process.kill()
+        for worker in workers:
+            worker.end()
 
 
 class _Worker:
     """One process and the line to it."""
 
-    def __init__(self) -> None:
+    def __init__(self, loads: Sequence[str]) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self.process: SpawnProcess = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self.process: SpawnProcess = context.Process(target=_serve, args=(theirs, loads), daemon=True)
         with _child_environment():
             self.process.start()
         theirs.close()
@@ -154,14 +166,14 @@ def _child_environment() -> Iterator[None]:
             signal.signal(signal.SIGINT, handler)
 
 
-def _serve(connection: Connection) -> None:
+def _serve(connection: Connection, loads: Sequence[str]) -> None:
     """Do what comes, until nobody is there any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-    importlib.import_module("sccal.batch.tasks")
-    importlib.import_module("sccal.report.run.page")
+    for module in loads:
+        importlib.import_module(module)
     # What is loaded stays; looking through it again and again for garbage costs a tenth of the work.
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)

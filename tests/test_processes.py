@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import time
 from dataclasses import dataclass
 
 import pytest
 
-from sccal.batch.processes import Here, Processes
 from sccal.errors import SccalError
+from sccal.processes import Here, Processes
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,12 @@ def test_a_killed_process_is_told_and_takes_no_other_task_with_it(workers):
     assert "--jobs" in str(error)
     assert found == {0: 0, 2: 4, 3: 9, 4: 16}
     assert dict(workers.results([Square(5)])) == {0: 25}
+
+
+def test_after_a_task_that_cannot_be_sent_the_next_ones_get_their_own_results(workers):
+    with pytest.raises((AttributeError, pickle.PicklingError)):
+        list(workers.results([Square(7), lambda: 1, Square(8)]))
+    assert dict(workers.results([Square(2), Square(3)])) == {0: 4, 1: 9}
 
 
 def test_nothing_is_left_behind():
