@@ -17,14 +17,12 @@ from sccal.effects.logged import logged_effects
 from sccal.effects.view import Belief, DriveView, view_drive, with_travel
 from sccal.errors import DataError, UsageError
 from sccal.filter.columns import MOTION_PORTS, HeadingBend, Placed, kernel_columns
-from sccal.filter.iterate import At, RunProblem
+from sccal.filter.iterate import LEAST_PATH, At, RunProblem
 from sccal.filter.layout import Columns
 
 SMALL_RAD, SMALL_S = 1e-3, 1e-3
 SMALL_SHARE = 1e-3
 """Steps of the derivatives by the heading, and by a parameter as a share of its prior."""
-MIN_PATH = 10
-"""Output times of a pass below which it does not show the path: the noise search keeps almost none."""
 
 
 @dataclass(frozen=True)
@@ -373,7 +371,7 @@ def _belief(problem: RunProblem, at: At) -> Belief:
     if at.path is not None:
         state = at.path.state
         t_s, east, north, yaw = at.path.timeline.out_t_s, state[:, 0], state[:, 1], state[:, 2]
-    if at.path is None or t_s.size < MIN_PATH:
+    if at.path is None or t_s.size < LEAST_PATH:
         aligned = problem.aligned
         turned = start.wheel_scale * np.exp(-1j * start.offset_rad) * aligned.path_along_yaw
         t_s = aligned.wheel_t_s

@@ -77,4 +77,5 @@ def kernel_columns(placed: Sequence[Placed], timeline: Timeline, bend: HeadingBe
         fix=stack(fix, timeline.fix_index.size),
         fix_port=np.array([FIX_PORTS[one.column.port] for one in fix], dtype=np.int32),
         fix_param=np.array([one.parameter for one in fix], dtype=np.int32),
+        fix_at=np.zeros(0),
     )

@@ -19,7 +19,16 @@ from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.filter.columns import kernel_columns
 from sccal.filter.forward import Filter, ForwardPass, numeric_limits, prior_covariance
-from sccal.filter.layout import BASE_STATES, WITH_OFFSET, Columns
+from sccal.filter.layout import (
+    BASE_STATES,
+    PORT_ANTENNA_FORWARD,
+    PORT_ANTENNA_LEFT,
+    PORT_EAST,
+    PORT_NORTH,
+    THETA,
+    WITH_OFFSET,
+    Columns,
+)
 from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants, Start, find_start, first_constants
 from sccal.results.noise import Noise
@@ -30,6 +39,10 @@ WORSE_NATS, MOST_HALVINGS = 3.0, 5
 """A step after which the data are less likely by more than what linearising elsewhere changes is halved, so often."""
 NARROW = 0.1
 """Of the effects' priors: so narrow they are where a pass with the whole ones would leave the path."""
+KNOWN_AFTER = 100.0
+STOOD_S = 5.0
+LEAST_PATH = 10
+"""Output times of a pass below which it does not show the path: the noise search keeps almost none."""
 TURNS_THE_START_RAD = np.radians(1.0)
 """Effects that turn the heading by less while the robot sets off are within the start's own sigma."""
 
@@ -129,7 +142,12 @@ class RunProblem:
         return kernel_columns((), self.timeline) if self.extension is None else self.extension.columns(self, at, clear)
 
     def start_given(self, columns: Columns, values: Floats) -> Start:
-        """Where the run begins if the heading holds what the effects put there: iron turns the first heading too."""
+        """Where the run begins if the effects hold: iron turns the first heading, and an antenna off the middle moves
+        the first place.
+        """
+        return _below_the_antenna(self._unbent_start(columns, values), columns, values)
+
+    def _unbent_start(self, columns: Columns, values: Floats) -> Start:
         if not columns.heading_param.size:
             return self.start
         added = columns.heading @ values[columns.heading_param] + columns.heading_known
@@ -147,7 +165,58 @@ class RunProblem:
         """What a pass from there needs, for passes under several noises; what is known of it already may be given."""
         clear = self.clear_steps(at.constants) if clear is None else clear
         columns = self.columns(at, clear) if columns is None else columns
-        return LaidOut(clear, columns, self.start_given(columns, at.values))
+        start = self.start_given(columns, at.values)
+        return LaidOut(clear, columns._replace(fix_at=self._antenna_at(at, columns, start)), start)
+
+    def _antenna_at(self, at: At, columns: Columns, start: Start) -> Floats:
+        """Heading (f,) about which the antenna turns with the robot; (0,) where it is not off the middle.
+
+        Where the arms were turned with the estimate as it moves, every correction of the heading would pass for a turn
+        that shows the arm: a robot that stands "finds" it in the noise of the fixes (Huang, Mourikis and Roumeliotis
+        2010). So they are turned with the path of an earlier pass; with the AHRS before that knew the heading, and as
+        one while the robot stands first.
+        """
+        if not np.any(columns.fix_port < PORT_EAST):
+            return np.zeros(0)
+        return self._headings(at, columns, start, self.aligned.fix_t_s[self.timeline.fix_index])
+
+    def _headings(self, at: At, columns: Columns, start: Start, t_s: Floats) -> Floats:
+        """The robot's heading as far as known at some times (f,), rad."""
+        read_s = self.aligned.heading_t_s[self.timeline.heading_index]
+        read = self.aligned.yaw_rad[self.timeline.heading_index] - columns.heading_known
+        read = read - columns.heading @ at.values[columns.heading_param]
+        first = (read_s > start.moving_from_s - STOOD_S) & (read_s <= max(start.moving_from_s, read_s[0]))
+        read = np.where(read_s <= start.moving_from_s, read[first].mean(), read)
+        path = at.path
+        if path is None or path.timeline.out_t_s.size < LEAST_PATH:
+            return np.asarray(np.interp(t_s, read_s, read) - start.offset_rad)
+        out_s, known = path.timeline.out_t_s, np.unwrap(path.state[:, THETA])
+        from_s = self._known_from_s
+        beside = (out_s >= from_s) & (out_s < from_s + STOOD_S)
+        turned = np.exp(1j * (np.interp(out_s, read_s, read) - known))
+        offset = float(np.angle(turned[beside].sum())) if beside.any() else start.offset_rad
+        early = np.interp(t_s, read_s, read) - offset
+        # As it was before the fix itself: with what each fix has taught, its own noise would seem to show the arm.
+        before = np.maximum(np.searchsorted(out_s, t_s) - 1, 0)
+        turned_rad = self._turned_by_wheels(at.constants)
+        since = np.interp(t_s, self.timeline.t_s, turned_rad) - np.interp(out_s, self.timeline.t_s, turned_rad)[before]
+        return np.where(t_s < from_s, early, known[before] + since)
+
+    def _turned_by_wheels(self, constants: Constants) -> Floats:
+        """Heading by the wheels alone at every event (n,), rad, from zero."""
+        right_m = constants.radius_right_m * self.timeline.right_rad
+        left_m = constants.radius_left_m * self.timeline.left_rad
+        return np.cumsum(right_m - left_m) / constants.track_m
+
+    @cached_property
+    def _known_from_s(self) -> float:
+        """When the fixes have shown the heading to a hundredth: a hundred of their sigmas after the robot set off."""
+        aligned = self.aligned
+        sigma_m = float(np.median(np.sqrt(aligned.fix_var_east_m2)))
+        gone = np.abs(aligned.travel_m - np.interp(self.start.moving_from_s, aligned.wheel_t_s, aligned.travel_m))
+        far = np.flatnonzero(gone > KNOWN_AFTER * sigma_m)
+        first, last = aligned.span_s
+        return min(float(aligned.wheel_t_s[far[0]]) if far.size else last, 0.5 * (first + last))
 
     def begun(
         self,
@@ -171,7 +240,7 @@ class RunProblem:
             self.centre,
             laid.clear,
             at.constants if linearise_there else None,
-            laid.columns,
+            laid.columns if linearise_there else laid.columns._replace(fix_at=np.zeros(0)),
             self.extra,
             with_sigmas,
         )
@@ -216,6 +285,17 @@ class RunProblem:
         logs = np.linalg.slogdet(inner)[1] - np.linalg.slogdet(wide)[1] - 2.0 * self.extra * np.log(s)
         shift = 0.5 * float(logs) + 0.5 * float(moved @ np.linalg.solve(inner, moved - left))
         return replace(found, final_state=state, final_covariance=covariance, prior_scale=s, nll_prior=shift)
+
+
+def _below_the_antenna(start: Start, columns: Columns, values: Floats) -> Start:
+    """The place that belongs to the first fixes, as far from them as the effects put these at the first of them."""
+    if not columns.fix.size:
+        return start
+    moved_m = np.zeros(4)
+    np.add.at(moved_m, columns.fix_port, columns.fix[0] * values[columns.fix_param])
+    turned = complex(*moved_m[[PORT_ANTENNA_FORWARD, PORT_ANTENNA_LEFT]]) * np.exp(1j * start.yaw_rad)
+    east_m, north_m = moved_m[PORT_EAST] + turned.real, moved_m[PORT_NORTH] + turned.imag
+    return replace(start, east_m=start.east_m - east_m, north_m=start.north_m - north_m)
 
 
 def iterate(

@@ -24,6 +24,8 @@ from sccal.filter.layout import (
 )
 
 TWO_PI = 2.0 * math.pi
+FAR_RAD = 0.3
+"""A heading so far from where the arm was to be linearised has nothing to do with it."""
 
 
 @compiled
@@ -85,8 +87,12 @@ def expect_fix(
     """Innovations east and north, and s̃_ee, s̃_nn, s̃_en of one fix; v, w ← C H_eᵀ, C H_nᵀ, and g_e, g_n."""
     x, p, P, V = belief.x, belief.p, belief.core, belief.slope
     m = p.shape[0]
-    ct = math.cos(x[THETA])
-    st = math.sin(x[THETA])
+    at = x[THETA]
+    if columns.fix_at.shape[0] > 0:
+        at = x[THETA] - wrap_angle(x[THETA] - columns.fix_at[f])
+        at = at if math.fabs(x[THETA] - at) < FAR_RAD else x[THETA]
+    ct = math.cos(at)
+    st = math.sin(at)
     arm_e, arm_n, shift_e, shift_n = 0.0, 0.0, 0.0, 0.0
     for k in range(columns.fix_param.shape[0]):
         port = columns.fix_port[k]
@@ -97,6 +103,9 @@ def expect_fix(
         else:
             shift_e += ce
             shift_n += cn
+    # h = p + R(θ̄) a + R'(θ̄) a (θ − θ̄): what turns the antenna from the heading of an earlier pass to this one's.
+    shift_e -= arm_n * (x[THETA] - at)
+    shift_n += arm_e * (x[THETA] - at)
     antenna[f, 0] = x[X] + arm_e + shift_e
     antenna[f, 1] = x[Y] + arm_n + shift_n
     nu_e = events.fix_east_m[f] - antenna[f, 0] - x[EAST_BIAS]

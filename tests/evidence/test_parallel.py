@@ -46,7 +46,7 @@ def test_results_come_in_the_order_of_the_items(workers, function):
 
 
 def test_the_first_failure_is_raised_as_it_is(workers):
-    with shared_among(workers), pytest.raises(DataError, match="-2.0 has no root"):
+    with shared_among(workers), pytest.raises(DataError, match=r"-2\.0 has no root"):
         each_apart(root, [1.0, -2.0, -3.0])
 
 

@@ -17,6 +17,7 @@ def make(
     coloured: bool = True,
     gate: float = 1e9,
     bent: bool = False,
+    arms_elsewhere: bool = False,
     soft: bool = False,
     outliers: float = 0.0,
     correlated: bool = False,
@@ -49,11 +50,15 @@ def make(
         fix=rng.normal(0.0, 1.0, (f, len(fix_ports))),
         fix_port=np.array(fix_ports, dtype=np.int32),
         fix_param=np.arange(len(motion_ports) + heading_columns, params, dtype=np.int32),
+        fix_at=np.zeros(0),
     )
     n = K.BASE_STATES + params
     theta = np.cumsum((right - left) * 0.08 / 0.7)
     step = 0.5 * (right + left) * 0.08
     east, north = np.cumsum(step * np.cos(theta)), np.cumsum(step * np.sin(theta))
+    if arms_elsewhere:
+        turns = 2.0 * np.pi * rng.integers(-1, 2, f)
+        columns = columns._replace(fix_at=theta[fix_row >= 0] + rng.normal(0.0, 0.1, f) + turns)
     far_heading, far_fix = rng.random(h) < outliers, rng.random(f) < outliers
     events = K.Events(
         t_s=t,

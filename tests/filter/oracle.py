@@ -57,7 +57,17 @@ def fix_reading(x, row, columns):
         left = left + part * (port == K.PORT_ANTENNA_LEFT)
         east = east + part * (port == K.PORT_EAST)
         north = north + part * (port == K.PORT_NORTH)
-    c, s = np.cos(x[2]), np.sin(x[2])
+    at = x[2]
+    if columns.fix_at.size:
+        # About another heading: linear in the state, the product of two differences left out.
+        beyond = x[2] - columns.fix_at[row]
+        beyond = beyond - 2 * np.pi * np.floor((np.real(beyond) + np.pi) / (2 * np.pi))
+        if abs(beyond) < 0.3:
+            at = np.real(x[2] - beyond)
+            c, s = np.cos(at), np.sin(at)
+            east = east - (s * np.real(forward) + c * np.real(left)) * beyond
+            north = north + (c * np.real(forward) - s * np.real(left)) * beyond
+    c, s = np.cos(at), np.sin(at)
     return np.array([x[0] + x[8] + c * forward - s * left + east, x[1] + x[9] + s * forward + c * left + north])
 
 

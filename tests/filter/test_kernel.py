@@ -37,6 +37,7 @@ def run(events, columns, model, x, P, fixes_teach=True):
         {"soft": True, "outliers": 0.05, "coloured": False},
         {"motion_ports": ALL_MOTION, "heading_columns": 2, "fix_ports": ALL_FIX, "soft": True, "outliers": 0.05},
         {"heading_columns": 2, "bent": True, "fix_ports": ALL_FIX, "soft": True, "correlated": True},
+        {"fix_ports": ALL_FIX, "arms_elsewhere": True},
     ],
     ids=str,
 )
