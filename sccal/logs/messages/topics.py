@@ -74,7 +74,7 @@ _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos", "nanosecs", "nanoseconds")
 SPOKEN = {"Sentence": "sentence", "String": "data"}
 """Where types of text hold it."""
-_SENTENCE_IN = re.compile(rb"\$(?:[A-Z]{5}|P[A-Z]{3}|KSXT),")
+_SENTENCE_IN = re.compile(rb"\$(?:[A-Z]{5}|P[A-Z]{3}|KSXT),|#[A-Z][A-Z0-9]{4,}A,[^;]{9,200};")
 _LOOK_AT = 200
 STAMPED = "stamped"
 """Column of sentences: 1 where the message has a stamp of its own."""
