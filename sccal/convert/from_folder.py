@@ -19,10 +19,12 @@ from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
 from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import find_sentences
 from sccal.logs.nmea.times import date_sentences
+from sccal.logs.rates import unit_of
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import Notice
 from sccal.logs.table import Table
 from sccal.logs.text import as_utf8
+from sccal.logs.wheel_units import UNITS
 
 _DAY_S = 86400.0
 _LOOK_BYTES, _LOOK_ROWS = 1 << 16, 200
@@ -39,7 +41,7 @@ def tables_of_folder(source: RunSource) -> RunTables:
     run, listed, folder = read_run(source), source.folder, source.path
     assert listed is not None
     notices = earlier_notices(folder)
-    encoder = _log_table(encoder_table, listed.file(ENCODER_FILE), notices)
+    encoder = _log_table(_counts_or_angles, listed.file(ENCODER_FILE), notices)
     ahrs = gnss = nmea = None
     if AHRS_FILE in listed.there:
         ahrs = _log_table(ahrs_table, listed.file(AHRS_FILE), notices)
@@ -63,6 +65,17 @@ def tables_of_folder(source: RunSource) -> RunTables:
         nmea=nmea,
         notices=tuple(notices),
     )
+
+
+def _counts_or_angles(path: Path) -> Table:
+    """The encoder's rows. Raises DataError where they hold speeds or metres."""
+    table = encoder_table(path)
+    if name := unit_of(table):
+        raise DataError(
+            f"{path}: wheels as {UNITS[name].words} (left_{name}, right_{name}) are calibrated as they are, and not "
+            "converted: write left_rad,right_rad instead"
+        )
+    return table
 
 
 def earlier_notices(folder: Path) -> list[Notice]:
