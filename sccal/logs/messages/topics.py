@@ -55,6 +55,16 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "acc_z": "linear_acceleration.z",
         "acc_cov_first": "linear_acceleration_covariance[0]",
     },
+    "PoseStamped": {
+        **{f"pose_{axis}_m": f"pose.position.{axis}" for axis in "xyz"},
+        **{axis: f"pose.orientation.{axis}" for axis in "xyzw"},
+    },
+    "PoseWithCovarianceStamped": {
+        **{f"pose_{axis}_m": f"pose.pose.position.{axis}" for axis in "xyz"},
+        **{axis: f"pose.pose.orientation.{axis}" for axis in "xyzw"},
+        **{"cov_ee": "pose.covariance[0]", "cov_en": "pose.covariance[1]", "cov_nn": "pose.covariance[7]"},
+        "cov_yaw": "pose.covariance[35]",
+    },
     "QuaternionStamped": {"x": "quaternion.x", "y": "quaternion.y", "z": "quaternion.z", "w": "quaternion.w"},
     "MagneticField": {"x": "magnetic_field.x", "y": "magnetic_field.y", "z": "magnetic_field.z"},
     "NavSatFix": _POSITION,
