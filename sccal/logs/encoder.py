@@ -11,6 +11,7 @@ from sccal.errors import DataError
 from sccal.logs.counter import SPEED_LIMIT_MPS, Repair, Scale, detect_width, repair
 from sccal.logs.limits import ANGLE_LIMIT_RAD, TICKS_LIMIT
 from sccal.logs.rates import unit_of, with_angles
+from sccal.logs.saturation import saturated
 from sccal.logs.streams import Notice, Vehicle, WheelStream
 from sccal.logs.table import Table, read_table
 from sccal.logs.wheel_units import RATE_COLUMNS, UNITS
@@ -69,6 +70,8 @@ def repaired_wheels(
     scale = Scale(counts_per_m, 1.0 if in_ticks else _ANGLE_QUANTUM_RAD)
     t_s = table.columns["t"]
     counts = np.column_stack((table.columns[names[1]], table.columns[names[2]]))
+    if in_ticks:
+        _require_room(t_s, counts, table, scale, vehicle, path)
     notices = list(table.notices)
     bits = _width(t_s, counts, table.line, scale, vehicle, table.source, notices) if in_ticks else None
     try:
@@ -94,6 +97,20 @@ def repaired_wheels(
         clock_steps=table.clock_steps,
     )
     return stream, tuple(notices)
+
+
+def _require_room(t_s: Floats, counts: Floats, table: Table, scale: Scale, vehicle: Vehicle, path: str) -> None:
+    """Raise DataError where a counter is full and stays so while the robot drives on."""
+    full = saturated(t_s, counts, 1.0 / scale.counts_per_m, vehicle.counter_bits)
+    if full is None:
+        return
+    which = ("left", "right")[full.side]
+    meanwhile = "and the other one is full as well" if full.both else "while the other wheel drives on"
+    raise DataError(
+        f"{path}: line {table.line[full.row]}, t = {t_s[full.row]:.3f} s: the {which} counter saturates: it stays at "
+        f"{full.count}, the end of a {full.bits}-bit counter, for {full.stays_s:.1f} s, {meanwhile}. It does not "
+        "wrap, so all travel from there on is lost: cut the log there, or use a counter that is wider or wraps"
+    )
 
 
 def _without_impossible(table: Table, names: tuple[str, ...], path: str, limit: float) -> Table:
