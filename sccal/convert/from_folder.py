@@ -13,6 +13,7 @@ from sccal.arrays import Floats
 from sccal.convert.tables import MOST_PLACES, NOTE_FILE, LogTable, NmeaLines, RunTables
 from sccal.errors import DataError
 from sccal.logs.ahrs import ahrs_table
+from sccal.logs.compressed import bytes_of, head_of
 from sccal.logs.encoder import encoder_table
 from sccal.logs.gnss_csv import gnss_table
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
@@ -46,7 +47,7 @@ def tables_of_folder(source: RunSource) -> RunTables:
     if AHRS_FILE in listed.there:
         ahrs = _log_table(ahrs_table, listed.file(AHRS_FILE), notices)
     if listed.fix_file == NMEA_FILE:
-        nmea = nmea_lines(listed.file(NMEA_FILE).read_bytes(), encoder.t_s, listed.file(NMEA_FILE), notices)
+        nmea = nmea_lines(bytes_of(listed.file(NMEA_FILE)), encoder.t_s, listed.file(NMEA_FILE), notices)
     elif listed.foreign:
         raise DataError(
             f"{folder / listed.foreign}: fixes of another program are calibrated as they are, and not converted: write "
@@ -99,8 +100,7 @@ def _log_table(read: Callable[[Path], Table], path: Path, notices: list[Notice])
 
 def _written_places(path: Path) -> dict[str, int]:
     """Decimals of each column in the first rows of a plain CSV, where they all have as many."""
-    with path.open("rb") as file:
-        lines = file.read(_LOOK_BYTES).decode("utf-8", "replace").splitlines()[:_LOOK_ROWS]
+    lines = head_of(path, _LOOK_BYTES).decode("utf-8", "replace").splitlines()[:_LOOK_ROWS]
     rows = [[cell.strip() for cell in line.split(",")] for line in lines if line and not line.startswith("#")]
     places = {}
     for name, *cells in zip(*(row for row in rows if len(row) == len(rows[0])), strict=True) if rows else ():

@@ -12,6 +12,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.logs.ahrs import heading_of_table
+from sccal.logs.compressed import plain_file
 from sccal.logs.encoder import repaired_wheels
 from sccal.logs.formats import ROS2, message_format
 from sccal.logs.gnss_csv import fixes_of_table
@@ -149,7 +150,8 @@ def _opened(path: Path, vehicle: Vehicle, options: ReadOptions) -> tuple[_Log, t
     topics = Topics(_asked_paths(options))
     metadata: dict[str, dict[str, str]] = {}
     form, parts = message_format(path) or ROS2, parts_after(path) if path.is_file() else ()
-    notices = form.read(path, topics.open, metadata)
+    with plain_file(path) as plain:
+        notices = form.read(plain, topics.open, metadata)
     for part in parts:
         notices += form.read(part, topics.open, metadata)
     if parts:

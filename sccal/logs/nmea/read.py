@@ -13,6 +13,7 @@ import numpy as np
 
 from sccal.arrays import Bools
 from sccal.errors import DataError
+from sccal.logs.compressed import bytes_of
 from sccal.logs.decimals import words_of
 from sccal.logs.nmea.fixes import read_fixes
 from sccal.logs.nmea.headings import HEADING_NAMES, read_heading
@@ -38,7 +39,7 @@ def read_nmea(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file, no sentence, or no fix.
     """
-    return parse_nmea(_bytes_of(path), path.name, path)
+    return parse_nmea(bytes_of(path), path.name, path)
 
 
 def read_nmea_heading(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
@@ -47,7 +48,7 @@ def read_nmea_heading(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file, no sentence, or no heading.
     """
-    return parse_nmea_heading(_bytes_of(path), path.name, path)
+    return parse_nmea_heading(bytes_of(path), path.name, path)
 
 
 def parse_nmea(raw: bytes, source: str, path: Path | str | None = None) -> tuple[FixStream, tuple[Notice, ...]]:
@@ -88,13 +89,6 @@ def parse_nmea_heading(
         why = "; ".join(met)
         raise DataError(f"{where}: no heading in {count} sentences ({len(raw)} bytes): {why}")
     return heading, tuple(notices)
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice]]:
