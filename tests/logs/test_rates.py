@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from sccal.arrays import Floats
+from sccal.convert.from_folder import tables_of_folder
 from sccal.errors import DataError
+from sccal.inspect.read import read_streams
 from sccal.logs.encoder import read_encoder
 from sccal.logs.rates import integrated
+from sccal.logs.run import discover
 from sccal.logs.streams import Notice, Vehicle, WheelStream
 from sccal.logs.wheel_units import UNITS
 
@@ -106,3 +109,24 @@ def test_speeds_that_no_robot_has_are_dropped_and_counted(tmp_path: Path) -> Non
     assert (told.count, told.where, told.severity) == (1, "line 102", "warning")
     with pytest.raises(DataError, match="check the unit"):
         read(tmp_path, 1e3 * LEFT_RADPS, RIGHT_RADPS + 1.0)
+
+
+def test_speeds_are_inspected_without_a_vehicle_and_are_not_converted(tmp_path: Path) -> None:
+    """The stand-in wheels go as far as the fixes, whatever unit the speeds have."""
+    run = tmp_path / "run"
+    run.mkdir()
+    read(run, 0.05 * LEFT_RADPS + 1.0, 0.05 * RIGHT_RADPS + 1.0, "left_mps,right_mps")
+    travel_m = np.interp(T_S, T_S, integrated(T_S, 1.0 + 0.025 * (LEFT_RADPS + RIGHT_RADPS)))
+    rows = [f"{t:.4f},{52.0 + m / 111_320.0:.9f},5.0,4" for t, m in zip(T_S[::5], travel_m[::5], strict=True)]
+    (run / "gnss.csv").write_text("\n".join(["t,lat_deg,lon_deg,fix_quality", *rows, ""]))
+    (run / "ahrs.csv").write_text("\n".join(["t,yaw_deg", *(f"{t:.4f},90" for t in T_S[::5]), ""]))
+    (source,) = discover([run])
+    streams = read_streams(source)
+    assert streams.vehicle is not None
+    assert streams.wheels is not None
+    went_m = 0.5 * streams.vehicle.wheel_radius_m * (streams.wheels.left_rad[-1] + streams.wheels.right_rad[-1])
+    assert went_m == pytest.approx(travel_m[-1], rel=0.01)
+    (run / "vehicle.toml").write_text("[nominal]\nwheel_radius_m = 0.25\ntrack_m = 0.7\n")
+    (source,) = discover([run])
+    with pytest.raises(DataError, match=r"wheels as m/s \(left_mps, right_mps\) are .* not converted"):
+        tables_of_folder(source)
