@@ -147,7 +147,12 @@ def bytes_of(path: Path) -> bytes:
     Raises:
         DataError: as pieces_of.
     """
-    return b"".join(pieces_of(path))
+    if is_packed(path):
+        return b"".join(pieces_of(path))
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def head_of(path: Path, size: int) -> bytes:
@@ -161,7 +166,7 @@ def head_of(path: Path, size: int) -> bytes:
 
 @contextmanager
 def plain_file(path: Path) -> Iterator[Path]:
-    """A file as it is, or where it is compressed a temporary one beside nothing else that holds what it unpacks to.
+    """A file as it is, or where it is compressed a temporary one that holds what it unpacks to.
 
     Raises:
         DataError: as pieces_of, with the name of the file itself in whatever is raised inside.
