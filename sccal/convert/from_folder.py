@@ -13,16 +13,19 @@ from sccal.arrays import Floats
 from sccal.convert.tables import MOST_PLACES, NOTE_FILE, LogTable, NmeaLines, RunTables
 from sccal.errors import DataError
 from sccal.logs.ahrs import ahrs_table
+from sccal.logs.compressed import bytes_of, head_of
 from sccal.logs.encoder import encoder_table
 from sccal.logs.gnss_csv import gnss_table
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
 from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import find_sentences
 from sccal.logs.nmea.times import date_sentences
+from sccal.logs.rates import unit_of
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import Notice
 from sccal.logs.table import Table
 from sccal.logs.text import as_utf8
+from sccal.logs.wheel_units import UNITS
 
 _DAY_S = 86400.0
 _LOOK_BYTES, _LOOK_ROWS = 1 << 16, 200
@@ -39,12 +42,12 @@ def tables_of_folder(source: RunSource) -> RunTables:
     run, listed, folder = read_run(source), source.folder, source.path
     assert listed is not None
     notices = earlier_notices(folder)
-    encoder = _log_table(encoder_table, listed.file(ENCODER_FILE), notices)
+    encoder = _log_table(_counts_or_angles, listed.file(ENCODER_FILE), notices)
     ahrs = gnss = nmea = None
     if AHRS_FILE in listed.there:
         ahrs = _log_table(ahrs_table, listed.file(AHRS_FILE), notices)
     if listed.fix_file == NMEA_FILE:
-        nmea = nmea_lines(listed.file(NMEA_FILE).read_bytes(), encoder.t_s, listed.file(NMEA_FILE), notices)
+        nmea = nmea_lines(bytes_of(listed.file(NMEA_FILE)), encoder.t_s, listed.file(NMEA_FILE), notices)
     elif listed.foreign:
         raise DataError(
             f"{folder / listed.foreign}: fixes of another program are calibrated as they are, and not converted: write "
@@ -63,6 +66,17 @@ def tables_of_folder(source: RunSource) -> RunTables:
         nmea=nmea,
         notices=tuple(notices),
     )
+
+
+def _counts_or_angles(path: Path) -> Table:
+    """The encoder's rows. Raises DataError where they hold speeds or metres."""
+    table = encoder_table(path)
+    if name := unit_of(table):
+        raise DataError(
+            f"{path}: wheels as {UNITS[name].words} (left_{name}, right_{name}) are calibrated as they are, and not "
+            "converted: write left_rad,right_rad instead"
+        )
+    return table
 
 
 def earlier_notices(folder: Path) -> list[Notice]:
@@ -86,8 +100,7 @@ def _log_table(read: Callable[[Path], Table], path: Path, notices: list[Notice])
 
 def _written_places(path: Path) -> dict[str, int]:
     """Decimals of each column in the first rows of a plain CSV, where they all have as many."""
-    with path.open("rb") as file:
-        lines = file.read(_LOOK_BYTES).decode("utf-8", "replace").splitlines()[:_LOOK_ROWS]
+    lines = head_of(path, _LOOK_BYTES).decode("utf-8", "replace").splitlines()[:_LOOK_ROWS]
     rows = [[cell.strip() for cell in line.split(",")] for line in lines if line and not line.startswith("#")]
     places = {}
     for name, *cells in zip(*(row for row in rows if len(row) == len(rows[0])), strict=True) if rows else ():

@@ -13,7 +13,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import read_digits
-from sccal.logs.nmea.kinds import LAYOUTS, NO_FIX, NOT_STATED, PLACED, READ_FOR_POSITIONS, Kind, Position
+from sccal.logs.nmea.kinds import LAYOUTS, LONG, NO_FIX, NOT_STATED, PLACED, READ_FOR_POSITIONS, Kind, Position
 from sccal.logs.nmea.positions import position_of
 from sccal.logs.nmea.quality import stated_quality
 from sccal.logs.nmea.sentences import Sentences, kinds_in
@@ -45,7 +45,7 @@ class Holders:
     with_crc: Bools
     """Ends with a CRC of 8 digits."""
     day: Floats
-    """Days since 1970-01-01 by RMC; NaN elsewhere."""
+    """Days since 1970-01-01 by RMC and long messages; NaN elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def find_holders(found: Sentences) -> Holders:
         lat[at], lat_digits[at] = _angle(part, fields, fields.latitude, b"NS", 90.0)
         lon[at], lon_digits[at] = _angle(part, fields, fields.longitude, b"EW", 180.0)
         quality[at] = stated_quality(part, fields)
-        if kind == Kind.RMC:
+        if kind in (Kind.RMC, *LONG):
             day[at] = _days(part, kind)
     placed = np.isfinite(lat) & np.isfinite(lon)
     return Holders(

@@ -24,6 +24,7 @@ from sccal.degrade.reference import after_both, reference_text
 from sccal.degrade.sheet import Sheet
 from sccal.degrade.tables import degrade_ahrs_csv, degrade_encoder_csv, degrade_gnss_csv
 from sccal.errors import DataError
+from sccal.logs.compressed import plain_name
 from sccal.logs.formats import FIXES
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE, VEHICLE_FILE
 from sccal.logs.outputs import Note
@@ -256,7 +257,9 @@ def _require_files(folder: Path, faults: Faults) -> None:
         (bool(faults.encoder_dropout), (ENCODER_FILE,), "--encoder-dropout"),
     ):
         if wanted and not any((folder / name).is_file() for name in names):
-            raise DataError(f"{folder}: lacks {' or '.join(names)}, which {what} would rewrite")
+            packed = sorted(one.name for one in folder.iterdir() if plain_name(one.name) != one.name)
+            beside = f"; compressed files ({', '.join(packed)}) are not rewritten: unpack them first" if packed else ""
+            raise DataError(f"{folder}: lacks {' or '.join(names)}, which {what} would rewrite{beside}")
 
 
 def _span_s(folder: Path, faults: Faults, notices: list[str]) -> tuple[float, float] | None:

@@ -13,6 +13,7 @@ from sccal.degrade.faults import Faults
 from sccal.degrade.folder import DegradedRun, degrade_folder
 from sccal.degrade.mcap import degrade_mcap
 from sccal.errors import DataError, Failure, SccalError
+from sccal.logs.compressed import is_packed, tool_for
 from sccal.logs.formats import MCAP, message_format
 from sccal.logs.messages.parts import parts_after
 from sccal.logs.names import VEHICLE_FILE
@@ -50,6 +51,8 @@ def degrade_paths(
 
 def _degrade_file(source: RunSource, out: Path, faults: Faults) -> DegradedRun:
     suffix = source.path.suffix
+    if is_packed(source.path):
+        raise DataError(f"{source.path}: compressed files are not degraded; unpack it first: `{tool_for(source.path)}`")
     if message_format(source.path) is not MCAP:
         raise DataError(f"{source.path}: of logs of messages only MCAP is degraded; `sccal convert` makes one of it")
     if parts := parts_after(source.path):

@@ -220,12 +220,14 @@ def _claim(piece: _Piece, rows: Ints, own_quality: Ints, epoch: Ints, fields: Po
         else:
             piece.put_field(stated, fields.quality, text.encode())
         if quality == 0 and fields.status is not None:
-            piece.put_field(rows[with_it], fields.status, b"V")
+            piece.put_field(rows[with_it], fields.status, dict(fields.lost)[fields.status].encode())
     noise_m = plan.faults.noise_m
     if not noise_m:
         return
     if fields.hdop is not None:
         _put_values(piece, rows, fields.hdop, lambda hdop, good: written_hdop(hdop, noise_m, new[good]))
+    for field in fields.sigmas_m or ():
+        _put_values(piece, rows, field, lambda sigma_m, _: np.hypot(sigma_m, noise_m))
     if fields.accuracy_m is not None:
         _put_values(piece, rows, fields.accuracy_m, lambda accuracy_m, _: np.hypot(accuracy_m, math.sqrt(2) * noise_m))
 

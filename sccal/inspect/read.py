@@ -18,6 +18,7 @@ from sccal.logs.messages.read import LooseStreams, read_loose_streams
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.one_clock import on_one_clock
 from sccal.logs.options import ReadOptions
+from sccal.logs.rates import unit_of, with_angles
 from sccal.logs.run import RunSource, read_run, vehicle_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.vehicle import read_vehicle
@@ -199,6 +200,9 @@ def _stand_in(
     Raises DataError where there are no wheels, or no fixes to scale them by.
     """
     table = encoder_table(folder.wheel_path)
+    if unit_of(table):
+        plain = vehicle or Vehicle("", folder.path / VEHICLE_FILE, 1.0, STAND_IN_TRACK_M)
+        table = with_angles(table, plain, str(folder.wheel_path))
     in_ticks = "left_ticks" in table.columns and "right_ticks" in table.columns
     unit = "ticks" if in_ticks else "rad"
     t_s, left, right = (table.columns[name] for name in ("t", f"left_{unit}", f"right_{unit}"))

@@ -10,6 +10,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sccal.logs.wheel_units import UNITS
+
 _SECONDS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0),
     **dict.fromkeys(("ms", "msec", "msecs", "millis", "milliseconds"), 1e-3),
@@ -24,6 +26,7 @@ _COUNTS = r"(?:ticks?|counts?|enc|encoder|enc(?:oder)?_?(?:ticks?|counts?|pos(?:
 _SIDES = {"left": "(?:left|l|lft)", "right": "(?:right|r|rgt)"}
 _WHEEL = r"(?:wheel_|motor_)?"
 _ANGLE = r"(?:angle_|pos_|position_)?"
+_MEASURED = r"(?:actual_|measured_)?(?:(?:speed|velocity|vel|rate|omega|travel|distance|dist|pos|position)_)?"
 _QUALITY = r"fix_?quality|gps_?quality|gnss_?quality|gga_?quality|gps_?qual|quality|fix_?type_?gga"
 _PATTERNS = {
     **{
@@ -33,6 +36,12 @@ _PATTERNS = {
     **{
         f"{side}_rad": rf"{_WHEEL}{mark}_{_WHEEL}{_ANGLE}(?:rad|radians?)|{_ANGLE}{mark}_rad"
         for side, mark in _SIDES.items()
+    },
+    **{
+        f"{side}_{name}": rf"{_WHEEL}{mark}_{_WHEEL}{_MEASURED}(?:{name}|{unit.spelled})|"
+        rf"{_MEASURED}{_WHEEL}{mark}(?:_wheel)?_(?:{name}|{unit.spelled})|{name}_{_WHEEL}{mark}"
+        for side, mark in _SIDES.items()
+        for name, unit in UNITS.items()
     },
     "yaw_deg": r"(?:yaw|heading|hdg|azimuth|compass)_(?:deg|degs|degrees?|°)|(?:deg|degrees)_(?:yaw|heading)",
     "yaw_rad": r"(?:yaw|heading|hdg|azimuth|compass)_(?:rad|rads|radians?)",

@@ -6,11 +6,11 @@ import re
 from pathlib import Path
 
 from sccal.errors import DataError
+from sccal.logs.compressed import PIECE_BYTES, pieces_of
 from sccal.logs.text import as_utf8
 
 LINE_LIMIT_BYTES = 64 * 1024
 COLUMN_LIMIT = 1000
-_CHUNK_BYTES = 1 << 20
 _SEPARATOR_LINE = re.compile(r"(?i:sep)=.?")
 """What spreadsheets write first: the separator of all that follows."""
 _BLANKS = b"\0 \t\r\n"
@@ -67,17 +67,17 @@ def require_csv(path: Path) -> None:
     Raises:
         DataError: it cannot be read, is empty, or has no header that a log may have.
     """
-    try:
-        with path.open("rb") as file:
-            begin = file.read(_CHUNK_BYTES)
-            if is_blank(begin):
-                if all(is_blank(chunk) for chunk in iter(lambda: file.read(_CHUNK_BYTES), b"")):
-                    raise blank_file(path, path.stat().st_size)
+    pieces = pieces_of(path)
+    begin = next(pieces, b"")
+    if is_blank(begin):
+        size = len(begin)
+        for piece in pieces:
+            if not is_blank(piece):
                 return
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+            size += len(piece)
+        raise blank_file(path, size)
     if as_utf8(begin) is not begin or (b"\n" not in begin and b"\r" in begin):
         return  # for the reader of tables to say, or to take
-    if len(begin) == _CHUNK_BYTES:
+    if len(begin) == PIECE_BYTES:
         begin += b"\nt"  # where all of it is comments, the header comes later
     split_header(begin, path)

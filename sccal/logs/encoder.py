@@ -10,8 +10,11 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.counter import SPEED_LIMIT_MPS, Repair, Scale, detect_width, repair
 from sccal.logs.limits import ANGLE_LIMIT_RAD, TICKS_LIMIT
+from sccal.logs.rates import unit_of, with_angles
+from sccal.logs.saturation import saturated
 from sccal.logs.streams import Notice, Vehicle, WheelStream
 from sccal.logs.table import Table, read_table
+from sccal.logs.wheel_units import RATE_COLUMNS, UNITS
 
 _TICKS = ("t", "left_ticks", "right_ticks")
 _ANGLES = ("t", "left_rad", "right_rad")
@@ -38,16 +41,23 @@ def encoder_table(path: Path) -> Table:
     Raises:
         DataError: unreadable file or missing columns.
     """
-    return read_table(path, (_TICKS, _ANGLES))
+    return read_table(path, (_TICKS, _ANGLES, *RATE_COLUMNS))
 
 
-def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStream, tuple[Notice, ...]]:
-    """Unwrap and repair a table with ``left_ticks,right_ticks`` or ``left_rad,right_rad``; ``path`` is for messages.
+def repaired_wheels(
+    table: Table, path: str, vehicle: Vehicle, of_rates: bool = False
+) -> tuple[WheelStream, tuple[Notice, ...]]:
+    """Unwrap and repair a table with ``left_ticks,right_ticks``, ``left_rad,right_rad`` or columns of another unit.
+
+    ``path`` is for messages. ``of_rates`` says that angles are integrated speeds: no gap's travel is known then.
 
     Raises:
         DataError: ticks without ``ticks_per_rev``, or counts that no motion explains.
     """
     in_ticks = set(_TICKS) <= table.columns.keys()
+    if not in_ticks and not set(_ANGLES) <= table.columns.keys():
+        of_rates = UNITS[unit_of(table)].rate
+        table = with_angles(table, vehicle, path)
     names, limit = (_TICKS, TICKS_LIMIT) if in_ticks else (_ANGLES, ANGLE_LIMIT_RAD)
     table = _without_impossible(table, names, path, limit)
     if in_ticks and vehicle.ticks_per_rev is None:
@@ -60,6 +70,8 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
     scale = Scale(counts_per_m, 1.0 if in_ticks else _ANGLE_QUANTUM_RAD)
     t_s = table.columns["t"]
     counts = np.column_stack((table.columns[names[1]], table.columns[names[2]]))
+    if in_ticks:
+        _require_room(t_s, counts, table, scale, vehicle, path)
     notices = list(table.notices)
     bits = _width(t_s, counts, table.line, scale, vehicle, table.source, notices) if in_ticks else None
     try:
@@ -70,7 +82,7 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
             f"check {names[1]},{names[2]} and ticks_per_rev, counter_bits and wheel_radius_m in {vehicle.path}"
         ) from error
     kept = table.keep(repaired.keep)
-    loose = _loose(kept, repaired, scale, notices)
+    loose = _loose(kept, repaired, scale, of_rates, notices)
     if TRAVEL_UNKNOWN in table.columns:
         told = np.cumsum(np.nan_to_num(table.columns[TRAVEL_UNKNOWN]) > 0)[repaired.keep]
         loose |= np.diff(told, prepend=0) > 0
@@ -85,6 +97,20 @@ def repaired_wheels(table: Table, path: str, vehicle: Vehicle) -> tuple[WheelStr
         clock_steps=table.clock_steps,
     )
     return stream, tuple(notices)
+
+
+def _require_room(t_s: Floats, counts: Floats, table: Table, scale: Scale, vehicle: Vehicle, path: str) -> None:
+    """Raise DataError where a counter is full and stays so while the robot drives on."""
+    full = saturated(t_s, counts, 1.0 / scale.counts_per_m, vehicle.counter_bits)
+    if full is None:
+        return
+    which = ("left", "right")[full.side]
+    meanwhile = "and the other one is full as well" if full.both else "while the other wheel drives on"
+    raise DataError(
+        f"{path}: line {table.line[full.row]}, t = {t_s[full.row]:.3f} s: the {which} counter saturates: it stays at "
+        f"{full.count}, the end of a {full.bits}-bit counter, for {full.stays_s:.1f} s, {meanwhile}. It does not "
+        "wrap, so all travel from there on is lost: cut the log there, or use a counter that is wider or wraps"
+    )
 
 
 def _without_impossible(table: Table, names: tuple[str, ...], path: str, limit: float) -> Table:
@@ -118,7 +144,7 @@ def _width(
     return detect_width(t_s, counts, scale)
 
 
-def _loose(kept: Table, repaired: Repair, scale: Scale, notices: list[Notice]) -> Bools:
+def _loose(kept: Table, repaired: Repair, scale: Scale, of_rates: bool, notices: list[Notice]) -> Bools:
     """(m) True at samples whose travel since the one before is not known well; tells the gaps."""
     t_s = kept.columns["t"]
     dt_s = np.diff(t_s, prepend=t_s[:1])
@@ -127,7 +153,7 @@ def _loose(kept: Table, repaired: Repair, scale: Scale, notices: list[Notice]) -
     gap = dt_s > max(5 * usual_dt_s, GAP_S)
     if gap.any():
         travel = np.abs(np.diff(repaired.counts, axis=0, prepend=repaired.counts[:1])).max(axis=1)
-        loose |= gap & (travel > 2 * scale.quantum)
+        loose |= gap & (of_rates | (travel > 2 * scale.quantum))
         what = f"gaps, {dt_s[gap].sum():.1f} s in all, the longest {dt_s.max():.1f} s"
         where = f"t = {t_s[gap][0]:.3f} s"
         notices.append(Notice(kept.source, what, int(gap.sum()), where, "warning" if loose.any() else "info"))

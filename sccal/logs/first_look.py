@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sccal.errors import DataError
+from sccal.logs.compressed import plain_name
 from sccal.logs.formats import FOLDER_FILES, message_format, run_files_in
 
 
@@ -31,7 +32,7 @@ def require_log(path: Path) -> None:
     if messages is not None and messages.look is not None:
         messages.look(path)
     looks = {one.name: one.look for one in FOLDER_FILES if one.look is not None}
-    folder = path.parent if path.name.lower() in looks else path
+    folder = path.parent if plain_name(path.name).lower() in looks else path
     there = run_files_in([entry.name for entry in folder.iterdir()]) if folder.is_dir() else {}
     for name, look in looks.items():
         if name in there and (folder / there[name]).is_file():

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
+from sccal.logs.compressed import is_packed, plain_name
 from sccal.logs.csv_header import require_csv
 from sccal.logs.messages.mcap_magic import require_mcap
 from sccal.logs.names import AHRS_FILE, BAG_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE
@@ -137,30 +138,39 @@ NO_LOGS = {
     "above",
     ".ulg": "an autopilot's log (PX4 .ulg) is not read: write its wheels, heading and fixes as the files above",
     ".bag.active": "a ROS 1 bag that was not closed: `rosbag reindex` mends it, then name it .bag",
-    ".gz": "compressed: `gunzip` it first",
-    ".bz2": "compressed: `bunzip2` it first",
-    ".zst": "compressed: `zstd -d` it first",
+    ".gz": "compressed, and not one of the files above by its name: `gunzip` it first",
+    ".bz2": "compressed, and not one of the files above by its name: `bunzip2` it first",
+    ".xz": "compressed, and not one of the files above by its name: `unxz` it first",
+    ".zst": "compressed, and not one of the files above by its name: `zstd -d` it first",
     ".zstd": "compressed: `zstd -d` it first, and name the result .mcap or .db3",
     ".gpx": "a .gpx track holds too few decimals and no quality: log NMEA, or write gnss.csv",
 }
 """What to do about files that are no runs, by the ends of their names."""
 
 
+def message_suffix(name: str) -> str:
+    """The ending of a file's name that says which messages it holds, compressed or not."""
+    return PurePath(plain_name(name)).suffix.lower()
+
+
 def message_format(path: Path) -> MessageFormat | None:
     """The row of a file that is a run on its own; None for any other file and for folders."""
-    suffix = path.suffix.lower()
+    suffix = message_suffix(path.name)
     return next((one for one in MESSAGE_FORMATS if one.suffix == suffix and path.is_file()), None)
 
 
 def run_files_in(names: Collection[str]) -> dict[str, str]:
-    """Which of a folder's names are run files, by the contract's name; capitals do not matter, an exact name does."""
-    found = {name.lower(): name for name in sorted(names)}
+    """Which of a folder's names are run files, by the contract's name; capitals do not matter, an exact name does.
+
+    A compressed file counts where no other one of the name is there.
+    """
+    found = {plain_name(name).lower(): name for name in sorted(names, key=lambda name: (not is_packed(name), name))}
     return {name: name if name in names else found[name] for name in RUN_FILES if name in found}
 
 
 def foreign_fixes(name: str) -> Callable[[Path], tuple[FixStream, tuple[Notice, ...]]] | None:
     """What reads the fixes of a file of another program; None for any other file."""
-    return next((read for end, read in FOREIGN_FIXES.items() if name.lower().endswith(end)), None)
+    return next((read for end, read in FOREIGN_FIXES.items() if plain_name(name).lower().endswith(end)), None)
 
 
 def are_of_a_bag(names: Collection[str]) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.errors import DataError
+from sccal.logs.compressed import bytes_of, head_of
 from sccal.logs.limits import SIGMA_LIMIT_M
 from sccal.logs.quality_words import mapped
 from sccal.logs.streams import FixStream, Notice
@@ -29,9 +30,8 @@ _FIX_MODE = 2
 def looks_like_gpsd(path: Path) -> bool:
     """Whether a file begins with a report and not with a sentence."""
     try:
-        with path.open("rb") as file:
-            return file.read(256).lstrip().startswith(b'{"class"')
-    except OSError:
+        return head_of(path, 256).lstrip().startswith(b'{"class"')
+    except DataError:
         return False
 
 
@@ -41,10 +41,7 @@ def read_gpsd(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file, or no report with a place and a time.
     """
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+    lines = bytes_of(path).decode(errors="replace").splitlines()
     rows, odd, without = [], 0, 0
     for report in _reports(lines):
         if report is None:

@@ -19,3 +19,11 @@ SPEED_LIMIT_MPS = 1e4
 WHEEL_RADIUS_M = (1e-3, 10.0)
 TRACK_M = (1e-2, 100.0)
 TICKS_PER_REV = (1e-3, 1e9)
+UNPACKED_RATIO = 200
+"""A compressed log is not so many times larger when unpacked: repeated rows reach about a hundred."""
+UNPACKED_FREE_BYTES = 64 << 20
+"""What any compressed file may unpack to besides."""
+UNPACKED_LIMIT_BYTES = 4 << 30
+"""What none may."""
+UNPACKING_MEMORY_BYTES = 256 << 20
+"""For what a decompressor has to remember; the common tools ask for a quarter of it at most."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from sccal.arrays import Floats
 from sccal.errors import DataError
+from sccal.logs.compressed import bytes_of
 from sccal.logs.limits import SIGMA_LIMIT_M
 from sccal.logs.nmea.times import LEAP_SECONDS
 from sccal.logs.quality_words import RTKLIB, mapped
@@ -34,10 +35,7 @@ def read_pos(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file, no header of a known form, or no row.
     """
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+    lines = bytes_of(path).decode(errors="replace").splitlines()
     head = next((found for line in lines if (found := _HEAD.match(line))), None)
     if head is None:
         raise DataError(f"{path}: no header line like '%  GPST  latitude(deg) longitude(deg) height(m) Q …': {_ADVICE}")

@@ -10,6 +10,7 @@ from itertools import islice
 from pathlib import Path, PurePath
 
 from sccal.errors import DataError, Failure, UsageError
+from sccal.logs.compressed import is_packed, plain_name
 from sccal.logs.folder import RunFolder, listed_folder, require_rows
 from sccal.logs.formats import (
     MCAP,
@@ -19,6 +20,7 @@ from sccal.logs.formats import (
     RUN_FILES,
     are_of_a_bag,
     message_format,
+    message_suffix,
     run_files_in,
 )
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
@@ -176,7 +178,7 @@ def _root(path: Path) -> Path:
         raise UsageError(f"{path}: no such file or folder")
     if path.is_dir():
         return path
-    if path.name.lower() in (*RUN_FILES, VEHICLE_FILE) or message_format(path) is not None:
+    if plain_name(path.name).lower() in (*RUN_FILES, VEHICLE_FILE) or message_format(path) is not None:
         return path.parent
     raise DataError(
         f"{path}: is not a run folder; name a folder that holds {', '.join(RUN_FILES)}, "
@@ -205,16 +207,22 @@ def _run_places(root: Path) -> Iterator[Path]:
             yield Path(folder)
         later = later_parts(Path(folder), files)
         for name in files:
-            suffix = Path(name).suffix.lower()
+            suffix = message_suffix(name)
             if (
                 name not in later
+                and not _unpacked_beside(name, files)
                 and suffix in MESSAGE_SUFFIXES
                 and not name.startswith(".")
-                and not (bag and suffix == ROS2.suffix)
+                and not (suffix == ROS2.suffix and (bag or (is_packed(name) and BAG_FILE in files)))
             ):
                 path = Path(folder) / name
                 if message_format(path) is not MCAP or library_of(path) != RESULT_LIBRARY:
                     yield path
+
+
+def _unpacked_beside(name: str, files: Sequence[str]) -> bool:
+    """Whether a compressed file stands beside itself unpacked: the same drive is not read twice."""
+    return is_packed(name) and plain_name(name) in files
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
@@ -233,7 +241,7 @@ def _nearest_vehicle(folder: Path, root: Path) -> Path | None:
 def _name_below(root: Path, place: Path) -> str:
     relative = place.relative_to(root).as_posix()
     if place.is_file():
-        return relative[: -len(place.suffix)]
+        return relative[: -len(place.name)] + Path(plain_name(place.name)).stem
     return relative if relative != "." else root.resolve().name or "run"
 
 

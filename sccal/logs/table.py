@@ -21,6 +21,7 @@ from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.bursts import spread_bursts
 from sccal.logs.column_names import contract_names
+from sccal.logs.compressed import bytes_of
 from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
 from sccal.logs.dialect import filled_pairs, in_seconds, qualities_of_text, times_of_text, with_points
 from sccal.logs.set_clock import carried_on
@@ -113,10 +114,7 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
 
 
 def _load(path: Path) -> bytes:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+    data = bytes_of(path)
     if is_blank(data):
         raise blank_file(path, len(data))
     data = as_utf8(data)

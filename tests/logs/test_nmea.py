@@ -321,8 +321,8 @@ def test_some_receive_times_missing_are_told(tmp_path: Path) -> None:
 
 
 def test_long_messages_alone_are_named(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="#BESTPOSA, a long message"):
+    with pytest.raises(DataError, match="#RANGEA, a long message"):
         read(
             tmp_path,
-            b"1717243200.5 #BESTPOSA,COM1,0,72.0,FINESTEERING,2316,561618.000;SOL_COMPUTED,NARROW_INT*00000000\n",
+            b"1717243200.5 #RANGEA,COM1,0,72.0,FINESTEERING,2316,561618.000;SOL_COMPUTED,NARROW_INT*00000000\n",
         )

@@ -209,7 +209,7 @@ def test_capitals_in_the_names_of_files_do_not_matter(tmp_path: Path) -> None:
     [
         ("flight.bin", "ArduPilot"),
         ("run.bag.active", "rosbag reindex"),
-        ("a/run_0.mcap.zstd", "zstd -d"),
+        ("a/wheels.csv.zst", "zstd -d"),
         ("imu.csv", ""),
     ],
 )

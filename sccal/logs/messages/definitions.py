@@ -33,6 +33,8 @@ _KNOWN_TEXTS = {
     "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z",
     "geometry_msgs/Pose": "Point position\nQuaternion orientation",
     "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance",
+    "geometry_msgs/PoseStamped": _HEADER + "Pose pose",
+    "geometry_msgs/PoseWithCovarianceStamped": _HEADER + "PoseWithCovariance pose",
     "geometry_msgs/Twist": "Vector3 linear\nVector3 angular",
     "geometry_msgs/TwistWithCovariance": "Twist twist\nfloat64[36] covariance",
     "geometry_msgs/QuaternionStamped": _HEADER + "Quaternion quaternion",

@@ -12,7 +12,7 @@ from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M
 from sccal.logs.messages.topics import STAMPED, Messages
 from sccal.logs.messages.wheels import of_messages
 from sccal.logs.nmea import parse_nmea, parse_nmea_heading
-from sccal.logs.nmea.kinds import LAYOUTS
+from sccal.logs.nmea.kinds import LAYOUTS, READ_FOR_POSITIONS
 from sccal.logs.place_units import in_ten_millionths
 from sccal.logs.quality import RTK_FIXED_M, quality_of
 from sccal.logs.streams import FixStream, HeadingStream, Notice
@@ -155,7 +155,7 @@ def heading_of_sentences(
     return stream, of_messages(notices)
 
 
-_POSITIONS = (b"GGA,", b"RMC,", b"GNS,", b"GGK,", b"KSXT,")
+_POSITIONS = tuple(LAYOUTS[kind].name.rpartition(",")[2].encode() + b"," for kind in READ_FOR_POSITIONS)
 
 
 _HEADINGS = tuple(

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sccal.arrays import Ints
 from sccal.errors import DataError
+from sccal.logs.compressed import head_of
 from sccal.logs.messages.mcap_chunks import DamagedError, decompressed
 from sccal.logs.messages.mcap_magic import MAGIC, require_mcap
 from sccal.logs.streams import Notice
@@ -83,11 +84,10 @@ def read_mcap(
 def library_of(path: Path) -> str:
     """What wrote the file, as its header says; empty where it says nothing or cannot be read."""
     try:
-        with path.open("rb") as file:
-            begin = memoryview(file.read(_LONGEST_HEADER))
+        begin = memoryview(head_of(path, _LONGEST_HEADER))
         _, at = _text(begin, len(MAGIC) + _HEAD_BYTES)
         return _text(begin, at)[0]
-    except (OSError, struct.error, ValueError):
+    except (DataError, struct.error, ValueError):
         return ""
 
 

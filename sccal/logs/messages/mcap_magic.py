@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sccal.errors import DataError
+from sccal.logs.compressed import head_of
 
 MAGIC = b"\x89MCAP0\r\n"
 """The first and the last bytes of an MCAP file."""
@@ -16,11 +17,7 @@ def require_mcap(path: Path) -> None:
     Raises:
         DataError: the file cannot be read, is empty, or is no MCAP file.
     """
-    try:
-        with path.open("rb") as file:
-            begin = file.read(len(MAGIC))
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
+    begin = head_of(path, len(MAGIC))
     if not begin:
         raise DataError(f"{path}: is empty (0 bytes); log it again or remove it")
     if begin != MAGIC:

@@ -12,6 +12,7 @@ import numpy as np
 from sccal.arrays import Floats
 from sccal.errors import DataError, UsageError
 from sccal.logs.ahrs import heading_of_table
+from sccal.logs.compressed import plain_file
 from sccal.logs.encoder import repaired_wheels
 from sccal.logs.formats import ROS2, message_format
 from sccal.logs.gnss_csv import fixes_of_table
@@ -26,6 +27,7 @@ from sccal.logs.messages.fixes import (
 )
 from sccal.logs.messages.heading import has_orientation, heading_of_field, heading_of_path, heading_of_quaternions
 from sccal.logs.messages.parts import parts_after
+from sccal.logs.messages.poses import POSE_KINDS, fixes_of_poses, is_measured, require_level, turns
 from sccal.logs.messages.topics import FIELDS, Messages, Topics
 from sccal.logs.messages.wheels import (
     joint_names,
@@ -148,7 +150,8 @@ def _opened(path: Path, vehicle: Vehicle, options: ReadOptions) -> tuple[_Log, t
     topics = Topics(_asked_paths(options))
     metadata: dict[str, dict[str, str]] = {}
     form, parts = message_format(path) or ROS2, parts_after(path) if path.is_file() else ()
-    notices = form.read(path, topics.open, metadata)
+    with plain_file(path) as plain:
+        notices = form.read(plain, topics.open, metadata)
     for part in parts:
         notices += form.read(part, topics.open, metadata)
     if parts:
@@ -277,12 +280,24 @@ def _chosen(
     if not candidates:
         kinds = ", ".join(kind for kind, _ in ranks)
         raise DataError(
-            f"{log.path}: no topic holds the {what} ({kinds}); the log has {log.listed()}; name a field with {instead}"
+            f"{log.path}: no topic holds the {what} ({kinds}); the log has {log.listed()}; "
+            f"{_left_alone(log, option)}name a field with {instead}"
         )
     others = ", ".join(m.topic for m in candidates[1:])
     source = log.source(candidates[0].topic)
     tell = (Notice(source, f"other topics for the {what} not read: {others}; {option} chooses", len(candidates) - 1),)
     return candidates[0], tell if others else ()
+
+
+def _left_alone(log: _Log, option: str) -> str:
+    """Which poses are there and not taken by themselves, and how they are asked for."""
+    poses = [m.topic for m in log.found.values() if m.kind in POSE_KINDS]
+    shown = ", ".join(sorted(poses)[:_LISTED])
+    return (
+        f"poses that rest, or whose topic names a goal or a filter, are taken with {option} ({shown}); "
+        if poses
+        else ""
+    )
 
 
 def _always(_: Messages) -> bool:
@@ -346,7 +361,7 @@ def _heading(log: _Log) -> tuple[HeadingStream, tuple[Notice, ...], tuple[str, .
         return bool(has_orientation(messages).any())
 
     ranks = [("Imu", oriented), ("QuaternionStamped", oriented), ("MagneticField", _always)]
-    ranks.append(("Sentence", has_headings))
+    ranks += [("Sentence", has_headings), *((kind, turns) for kind in POSE_KINDS)]
     messages, tell = _chosen(log, "heading", "--heading-topic", options.heading_topic, ranks, "--yaw TOPIC:path")
     where, source = log.where(messages.topic), log.source(messages.topic)
     if messages.kind == "Sentence":
@@ -354,6 +369,8 @@ def _heading(log: _Log) -> tuple[HeadingStream, tuple[Notice, ...], tuple[str, .
     elif messages.kind == "MagneticField":
         stream, notices = heading_of_field(messages, _levelling_imu(log), log.vehicle, where, source)
     else:
+        if messages.kind in POSE_KINDS:
+            require_level(messages, where)
         stream, notices = heading_of_quaternions(messages, options.orientation, log.vehicle, where, source)
     return stream, (*tell, *notices), (messages.topic,)
 
@@ -390,12 +407,15 @@ def _fixes(log: _Log) -> tuple[FixStream, tuple[Notice, ...], tuple[str, ...]]:
         ("GPSFix", positions_in),
         ("LocationFix", positions_in),
         ("NavPVT", positions_in),
+        *((kind, is_measured) for kind in POSE_KINDS),
     ]
     instead = "--latitude TOPIC:path and --longitude TOPIC:path"
     messages, tell = _chosen(log, "fixes", "--fix-topic", options.fix_topic, ranks, instead)
     where, source = log.where(messages.topic), log.source(messages.topic)
     if messages.kind == "Sentence":
         stream, notices = fixes_of_sentences(messages, where, source, _places(log, messages.topic))
+    elif messages.kind in POSE_KINDS:
+        stream, notices = fixes_of_poses(messages, where, source)
     else:
         stream, notices = fixes_of_positions(messages, where, source)
     return stream, (*tell, *notices), (messages.topic,)

@@ -55,6 +55,16 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "acc_z": "linear_acceleration.z",
         "acc_cov_first": "linear_acceleration_covariance[0]",
     },
+    "PoseStamped": {
+        **{f"pose_{axis}_m": f"pose.position.{axis}" for axis in "xyz"},
+        **{axis: f"pose.orientation.{axis}" for axis in "xyzw"},
+    },
+    "PoseWithCovarianceStamped": {
+        **{f"pose_{axis}_m": f"pose.pose.position.{axis}" for axis in "xyz"},
+        **{axis: f"pose.pose.orientation.{axis}" for axis in "xyzw"},
+        **{"cov_ee": "pose.covariance[0]", "cov_en": "pose.covariance[1]", "cov_nn": "pose.covariance[7]"},
+        "cov_yaw": "pose.covariance[35]",
+    },
     "QuaternionStamped": {"x": "quaternion.x", "y": "quaternion.y", "z": "quaternion.z", "w": "quaternion.w"},
     "MagneticField": {"x": "magnetic_field.x", "y": "magnetic_field.y", "z": "magnetic_field.z"},
     "NavSatFix": _POSITION,
@@ -74,7 +84,7 @@ _SECONDS = ("sec", "secs", "seconds")
 _NANOSECONDS = ("nanosec", "nsec", "nsecs", "nanos", "nanosecs", "nanoseconds")
 SPOKEN = {"Sentence": "sentence", "String": "data"}
 """Where types of text hold it."""
-_SENTENCE_IN = re.compile(rb"\$(?:[A-Z]{5}|P[A-Z]{3}|KSXT),")
+_SENTENCE_IN = re.compile(rb"\$(?:[A-Z]{5}|P[A-Z]{3}|KSXT),|#[A-Z][A-Z0-9]{4,}A,[^;]{9,200};")
 _LOOK_AT = 200
 STAMPED = "stamped"
 """Column of sentences: 1 where the message has a stamp of its own."""

@@ -13,6 +13,7 @@ from sccal.errors import DataError
 from sccal.logs.encoder import repaired_wheels
 from sccal.logs.messages.topics import Messages
 from sccal.logs.options import ReadOptions
+from sccal.logs.rates import integrated
 from sccal.logs.streams import Notice, Vehicle, WheelStream
 from sccal.logs.table import Table
 from sccal.logs.timeline import order_in_time
@@ -197,7 +198,7 @@ def _repaired(
     order, order_notices = order_in_time(wheel.t_s, wheel.number, source)
     t_s, left, right = wheel.t_s[order], left[order], right[order]
     if rates:
-        left, right = _integrated(t_s, left), _integrated(t_s, right)
+        left, right = integrated(t_s, left), integrated(t_s, right)
     notices = list(order_notices)
     wrapped = unit == "rad" and not rates and (_wrapped(left) or _wrapped(right))
     if wrapped:
@@ -208,7 +209,7 @@ def _repaired(
         unit, left, right = "ticks", left * (per_turn / (2 * np.pi)), right * (per_turn / (2 * np.pi))
     columns = {"t": t_s, f"left_{unit}": left, f"right_{unit}": right}
     table = Table(source, columns, wheel.number[order], t_s.size, tuple(notices))
-    stream, found = repaired_wheels(table, path, vehicle)
+    stream, found = repaired_wheels(table, path, vehicle, rates)
     if wrapped:
         found = tuple(notice for notice in found if "counter wraps" not in notice.what)
     return stream, of_messages(found)
@@ -220,8 +221,3 @@ def _wrapped(angle_rad: Floats) -> bool:
     low, high = float(angle_rad.min()), float(angle_rad.max())
     within = (low >= -np.pi - slack and high <= np.pi + slack) or (low >= -slack and high <= 2 * np.pi + slack)
     return within and bool((np.abs(np.diff(angle_rad)) > np.pi).any())
-
-
-def _integrated(t_s: Floats, rate: Floats) -> Floats:
-    """Trapezoidal integral from 0."""
-    return np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t_s))))

@@ -1,6 +1,7 @@
 """Position fixes out of NMEA sentences, one for each epoch, with what other sentences say about that epoch.
 
-GST gives sigmas, never widened by the HDOP; RMC, KSXT and VTG give the speed over ground.
+GST gives sigmas, never widened by the HDOP, unless the sentence states its own; RMC, KSXT, VTG and BESTVELA give the
+speed over ground.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import numpy as np
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import HEIGHT_LIMIT_M, SIGMA_LIMIT_M, SPEED_LIMIT_MPS
 from sccal.logs.nmea.kinds import GST_BEARING, GST_SIGMAS, LAYOUTS, READ_FOR_SPEEDS, UNTIMED, Kind
-from sccal.logs.nmea.positions import altitude, best_kind, extras
+from sccal.logs.nmea.positions import altitude, best_kind, extras, own_sigmas
+from sccal.logs.nmea.quality import worded
 from sccal.logs.nmea.receivers import one_receiver
 from sccal.logs.nmea.sentences import Sentences
 from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
@@ -36,6 +38,8 @@ def read_fixes(dated: Dated, source: str, notices: list[Notice]) -> FixStream | 
     running_s = dated.running_s[rows]
     talker = int(fixes.talker[0])
     sigma_east_m, sigma_north_m, cov_en_m2 = _stated_sigmas(dated, running_s, talker)
+    if (own := own_sigmas(fixes, positions.kind)) is not None:
+        (sigma_east_m, sigma_north_m), cov_en_m2 = own, np.zeros(rows.size)
     _tell_missing_host_times(fixes, source, notices)
     return FixStream(
         host_t_s=fixes.host_t_s,
@@ -64,7 +68,7 @@ def _possible_heights(alt_m: Floats, fixes: Sentences, source: str, notices: lis
 
 
 def _speeds(dated: Dated, running_s: Floats) -> Floats | None:
-    """Speed over ground (m/s) at the epochs ``running_s``, from RMC, else KSXT, else VTG; None where there is none."""
+    """Speed over ground (m/s) at the epochs ``running_s``, from the first of READ_FOR_SPEEDS that has it, or None."""
     wanted = epoch_key(running_s)
     speed_mps = np.full(wanted.size, np.nan)
     for kind in READ_FOR_SPEEDS:
@@ -88,13 +92,15 @@ def _speed_mps(own: Sentences, kind: Kind) -> Floats:
     fields = LAYOUTS[kind].speed
     assert fields is not None
     value = np.full(own.start.size, np.nan) if fields.kmph is None else own.number(fields.kmph) / 3.6
+    if fields.mps is not None:
+        value = own.number(fields.mps)
     if fields.knots is not None:
         value = np.where(np.isfinite(value), value, own.number(fields.knots) * _KNOT_MPS)
     if fields.told_by is None:
         return value
-    letter = own.letter(fields.told_by)
-    holds = letter == ord(fields.holds) if fields.holds else letter != ord(fields.holds_not)
-    return np.where(holds, value, np.nan)
+    if fields.holds:
+        return np.where(worded(own, fields.told_by, {fields.holds: 1}) == 1, value, np.nan)
+    return np.where(own.letter(fields.told_by) != ord(fields.holds_not), value, np.nan)
 
 
 def _epochs_by_talker(dated: Dated, rows: Ints) -> Floats:

@@ -26,7 +26,7 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.limits import SIGMA_LIMIT_RAD
-from sccal.logs.nmea.kinds import LAYOUTS, READ_FOR_HEADINGS, UNTIMED, Heading, Kind
+from sccal.logs.nmea.kinds import INERTIAL, LAYOUTS, READ_FOR_HEADINGS, UNTIMED, Heading, Kind
 from sccal.logs.nmea.quality import worded
 from sccal.logs.nmea.sentences import Sentences, talker_name
 from sccal.logs.nmea.times import Dated, epoch_key, epochs_of_untimed
@@ -92,7 +92,7 @@ def read_heading(dated: Dated, source: str, notices: list[Notice]) -> HeadingStr
         notices.append(Notice(name, what, int(none.sum()), where, "warning"))
         chosen, readings = chosen[~none], readings.take(~none)
     what = f"headings read, clockwise from {_fields_of(readings.kind).north} north"
-    if readings.kind not in (Kind.PASHR, Kind.PSXN) and readings.pitch_deg is not None:
+    if readings.kind not in (Kind.PASHR, Kind.PSXN, *INERTIAL) and readings.pitch_deg is not None:
         what += "; their pitch is the inclination of the baseline between the antennas"
     notices.append(Notice(name, what, int(chosen.size)))
     return HeadingStream(

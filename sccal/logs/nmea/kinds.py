@@ -29,6 +29,13 @@ All qualities are told in the numbers of GGA. Sources:
 * UNIHEADINGA: Unicore N4 reference commands; HEADINGA, HEADING2A, DUALANTENNAHEADINGA: NovAtel OEM7 documentation. A
   header with GPS week and time of week, then state, type of solution, length, heading, pitch, reserved, sigmas. They
   begin with ``#`` and end in a CRC-32.
+* BESTPOSA, BESTGNSSPOSA: NovAtel OEM7 documentation: solution status, position type, latitude, longitude, height above
+  sea level, undulation, datum, sigmas of latitude, longitude and height, station, ages, satellites. BESTPOS of a
+  receiver with an IMU may be the inertial solution; BESTGNSSPOS never is. BESTNAVA: Unicore N4 reference commands; the
+  same fields after Unicore's header. BESTVELA: status, type, latency, age, speed over ground in m/s.
+* INSPVAA, INSPVAXA: NovAtel OEM7 documentation, SPAN logs: week and seconds, or status and position type, then
+  latitude, longitude, height, velocities, roll, pitch, azimuth. Roll is a right-handed rotation about the forward axis
+  and pitch about the one to the right: left side up and nose up are positive, as in ahrs.csv.
 
 Unicore's second antenna sends the usual sentences with an H at the end of the address.
 """
@@ -77,6 +84,12 @@ class Kind(IntEnum):
     UNIHEADING = 29
     HEADING = 30
     DUAL_HEADING = 31
+    BEST_POS = 32
+    BEST_GNSS_POS = 33
+    BEST_NAV = 34
+    BEST_VEL = 35
+    INS_PVA = 36
+    INS_PVAX = 37
 
 
 NO_FIX = 0
@@ -96,6 +109,8 @@ class Claim:
     """What is written for each GGA quality."""
     unknown: int = NOT_STATED
     """The quality of another number above zero."""
+    others: int = NOT_STATED
+    """The quality of another word."""
 
 
 _MODES = {"N": 0, "S": 8, "M": 7, "E": 6, "A": 1, "P": 3, "D": 2, "F": 5, "R": 4}
@@ -128,6 +143,38 @@ _ASHTECH = Claim(
 )
 
 
+_SOLUTIONS = {
+    **dict.fromkeys(("NONE", "DOPPLER_VELOCITY", "INS"), 0),
+    **dict.fromkeys(("FIXEDPOS", "FIXEDHEIGHT"), 7),
+    **dict.fromkeys(("SINGLE", "INS_PSRSP"), 1),
+    **dict.fromkeys(("PSRDIFF", "INS_PSRDIFF"), 2),
+    **dict.fromkeys(("WAAS", "SBAS", "INS_SBAS", "OMNISTAR"), 9),
+    "PROPAGATED": 6,
+    **dict.fromkeys(("L1_FLOAT", "IONOFREE_FLOAT", "NARROW_FLOAT", "WIDE_FLOAT", "FLOATCONV", "INS_RTKFLOAT"), 5),
+    **dict.fromkeys(("PPP_CONVERGING", "PPP", "PPP_BASIC_CONVERGING", "PPP_BASIC"), 5),
+    **dict.fromkeys(("INS_PPP_CONVERGING", "INS_PPP", "INS_PPP_BASIC_CONVERGING", "INS_PPP_BASIC"), 5),
+    **dict.fromkeys(("OMNISTAR_HP", "OMNISTAR_XP", "CDGPS"), 5),
+    **dict.fromkeys(("L1_INT", "WIDE_INT", "NARROW_INT", "INS_RTKFIXED"), 4),
+}
+"""Types of a position in long messages."""
+_SOLUTION = Claim(
+    "word",
+    _SOLUTIONS,
+    {0: "NONE", 1: "SINGLE", 2: "PSRDIFF", 3: "SINGLE", 4: "NARROW_INT", 5: "NARROW_FLOAT"}
+    | {6: "PROPAGATED", 7: "FIXEDPOS", 8: "SINGLE", 9: "WAAS"},
+)
+_INS_FIXED = ("INS_SOLUTION_GOOD",)
+_INS_LOOSE = ("INS_ALIGNMENT_COMPLETE", "INS_HIGH_VARIANCE")
+_INS_NONE = ("INS_INACTIVE", "INS_ALIGNING", "INS_SOLUTION_FREE", "INS_SOLUTION_NOT_GOOD")
+"""States of an inertial solution. A free one has lost its fixes, and its position drifts."""
+_INS = Claim(
+    "word",
+    dict.fromkeys((*_INS_FIXED, *_INS_LOOSE), NOT_STATED) | dict.fromkeys(_INS_NONE, 0),
+    dict.fromkeys(range(1, 10), _INS_FIXED[0]) | {0: _INS_NONE[0]},
+    others=NO_FIX,
+)
+
+
 @dataclass(frozen=True)
 class Position:
     """The fields of a position and what goes with it."""
@@ -139,13 +186,17 @@ class Position:
     in_degrees: bool = False
     """Signed decimal degrees; else degrees and minutes, with the hemisphere in the field after."""
     status: int | None = None
-    """Field that is A with a fix and V without."""
+    """Field that says whether there is a fix."""
+    holds: tuple[str, ...] = ("A",)
+    """What stands there with one."""
     altitude_m: int | None = None
     separation_m: int | None = None
     """What to add to the altitude for a height above the ellipsoid, where it is given."""
     hdop: int | None = None
     accuracy_m: int | None = None
     """The receiver's own error estimate."""
+    sigmas_m: tuple[int, int] | None = None
+    """East and north, of the position itself."""
     from_base_m: tuple[int, int] | None = None
     """East and north of the base."""
     extras: Mapping[str, int] = field(default_factory=lambda: _NOTHING)
@@ -158,10 +209,13 @@ class Position:
 
 @dataclass(frozen=True)
 class Date:
-    """The field or fields of a date, and their form; a stamp is year, month, day and the time in one."""
+    """The field or fields of a date, and their form.
+
+    A stamp is year, month, day and the time in one; after a GPS week its seconds or milliseconds stand.
+    """
 
     fields: tuple[int, ...]
-    form: Literal["ddmmyy", "mmddyy", "dd,mm,yyyy", "stamp"]
+    form: Literal["ddmmyy", "mmddyy", "dd,mm,yyyy", "stamp", "week,s", "week,ms"]
 
 
 @dataclass(frozen=True)
@@ -170,9 +224,10 @@ class Speed:
 
     knots: int | None = None
     kmph: int | None = None
+    mps: int | None = None
     told_by: int | None = None
     holds: str = ""
-    """The letter with which it holds."""
+    """The letter or word with which it holds."""
     holds_not: str = ""
     """The letter with which it does not."""
 
@@ -216,6 +271,18 @@ _SOLVED = ("NARROW_INT", "WIDE_INT", "L1_INT", "INS_RTKFIXED")
 _UNSOLVED = ("NARROW_FLOAT", "WIDE_FLOAT", "L1_FLOAT", "IONOFREE_FLOAT", "INS_RTKFLOAT", "PSRDIFF", "SINGLE")
 """Types of solution in long messages, Unicore's and NovAtel's."""
 _LONG_HEADING = Heading(13, pitch=14, sigma=16, state=11, fixed=_SOLVED, loose=_UNSOLVED)
+_BEST_POS = Layout(
+    "BESTPOSA",
+    fewest=24,
+    time=6,
+    clock="week_s",
+    date=Date((5,), "week,s"),
+    position=Position(
+        12, 13, quality=11, claim=_SOLUTION, in_degrees=True, status=10, holds=("SOL_COMPUTED",), altitude_m=14,
+        separation_m=15, sigmas_m=(18, 17), extras={"satellites": 24, "age_s": 21},
+        lost=((10, "INSUFFICIENT_OBS"), (11, "NONE")),
+    ),
+)  # fmt: skip
 
 LAYOUTS: dict[Kind, Layout] = {
     Kind.GGA: Layout(
@@ -326,6 +393,39 @@ LAYOUTS: dict[Kind, Layout] = {
     Kind.UNIHEADING: Layout("UNIHEADINGA", fewest=17, time=5, clock="week_ms", heading=_LONG_HEADING),
     Kind.HEADING: Layout("HEADINGA", fewest=17, time=6, clock="week_s", heading=_LONG_HEADING),
     Kind.DUAL_HEADING: Layout("DUALANTENNAHEADINGA", fewest=17, time=6, clock="week_s", heading=_LONG_HEADING),
+    Kind.BEST_POS: _BEST_POS,
+    Kind.BEST_GNSS_POS: replace(_BEST_POS, name="BESTGNSSPOSA"),
+    Kind.BEST_NAV: replace(_BEST_POS, name="BESTNAVA", time=5, clock="week_ms", date=Date((4,), "week,ms")),
+    Kind.BEST_VEL: Layout(
+        "BESTVELA",
+        fewest=16,
+        time=6,
+        clock="week_s",
+        speed=Speed(mps=14, told_by=10, holds="SOL_COMPUTED"),
+    ),
+    Kind.INS_PVAX: Layout(
+        "INSPVAXA",
+        fewest=30,
+        time=6,
+        clock="week_s",
+        date=Date((5,), "week,s"),
+        heading=Heading(21, pitch=20, roll=19, sigma=30, state=10, fixed=_INS_FIXED, loose=_INS_LOOSE),
+        position=Position(
+            12, 13, quality=11, claim=_SOLUTION, in_degrees=True, status=10, holds=(*_INS_FIXED, *_INS_LOOSE),
+            altitude_m=14, separation_m=15, sigmas_m=(23, 22), lost=((10, "INS_INACTIVE"), (11, "NONE")),
+        ),
+    ),
+    Kind.INS_PVA: Layout(
+        "INSPVAA",
+        fewest=21,
+        time=6,
+        clock="week_s",
+        date=Date((5,), "week,s"),
+        heading=Heading(20, pitch=19, roll=18, state=21, fixed=_INS_FIXED, loose=_INS_LOOSE),
+        position=Position(
+            12, 13, quality=21, claim=_INS, in_degrees=True, altitude_m=14, lost=((21, "INS_INACTIVE"),)
+        ),
+    ),
     Kind.PSXN: Layout("PSXN,23", fewest=3, heading=Heading(3, pitch=2, roll=1)),
     Kind.HDG: Layout("HDG", fewest=1, heading=Heading(1, north="magnetic")),
     Kind.HDM: Layout("HDM", fewest=1, heading=Heading(1, north="magnetic")),
@@ -339,19 +439,33 @@ LAYOUTS |= {own: replace(LAYOUTS[first], name=f"{first.name}H") for own, first i
 
 GST_SIGMAS, GST_BEARING = (3, 4, 6, 7), 5
 """Fields of GST: semi-major and semi-minor axis, north, east; and the bearing of the major axis."""
-READ_FOR_POSITIONS = (Kind.GGA, Kind.GNS, Kind.GGK, Kind.KSXT, Kind.RMC)
+READ_FOR_POSITIONS = (
+    *(Kind.GGA, Kind.BEST_GNSS_POS, Kind.BEST_POS, Kind.BEST_NAV, Kind.GNS, Kind.GGK, Kind.KSXT),
+    *(Kind.INS_PVAX, Kind.RMC, Kind.INS_PVA),
+)
 """By how much they say about their quality."""
 READ_FOR_HEADINGS = (
     *(Kind.PASHR, Kind.AVR, Kind.KSXT, Kind.HRP, Kind.UNIHEADING, Kind.HEADING, Kind.DUAL_HEADING, Kind.TAR),
-    *(Kind.PASHR_ATT, Kind.HPR, Kind.TRA, Kind.PSAT_HPR, Kind.THS, Kind.HDT, Kind.PSXN, Kind.HDG, Kind.HDM),
+    *(Kind.INS_PVAX, Kind.INS_PVA, Kind.PASHR_ATT, Kind.HPR, Kind.TRA, Kind.PSAT_HPR, Kind.THS, Kind.HDT, Kind.PSXN),
+    *(Kind.HDG, Kind.HDM),
 )
 """The ones that say more about their quality first."""
 PLACED = tuple(kind for kind, layout in LAYOUTS.items() if layout.position is not None)
 """All that hold a position."""
-LONG = (Kind.UNIHEADING, Kind.HEADING, Kind.DUAL_HEADING)
+INERTIAL = (Kind.INS_PVAX, Kind.INS_PVA)
+"""What a filter makes of fixes and gyros."""
+LONG = (
+    *(Kind.UNIHEADING, Kind.HEADING, Kind.DUAL_HEADING),
+    *(Kind.BEST_POS, Kind.BEST_GNSS_POS, Kind.BEST_NAV, Kind.BEST_VEL, *INERTIAL),
+)
 """Messages that begin with ``#``, part fields by ``;`` too, and end in a CRC-32."""
-READ_FOR_SPEEDS = (Kind.RMC, Kind.KSXT, Kind.VTG)
-READ_FOR_DATES = (Kind.RMC, Kind.ZDA, Kind.KSXT, Kind.GGK)
+COURSES = (Kind.RMC, Kind.KSXT, Kind.VTG)
+"""Sentences with a course over ground, which is no heading."""
+READ_FOR_SPEEDS = (*COURSES, Kind.BEST_VEL)
+READ_FOR_DATES = (
+    *(Kind.RMC, Kind.ZDA, Kind.KSXT, Kind.GGK),
+    *(Kind.BEST_GNSS_POS, Kind.BEST_POS, Kind.BEST_NAV, *INERTIAL),
+)
 READ = tuple({*READ_FOR_POSITIONS, *READ_FOR_HEADINGS, *READ_FOR_SPEEDS, *READ_FOR_DATES, Kind.GST})
 """What the reader takes; the rest is passed over."""
 UNTIMED = tuple(kind for kind in READ if LAYOUTS[kind].time is None)

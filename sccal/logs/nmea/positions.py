@@ -1,7 +1,7 @@
 """Positions out of the sentences that state one: which kind is read, its qualities, heights and further columns.
 
-Positions come from GGA; where a log has none that can be used, from GNS, PTNL,GGK, KSXT or RMC, in this order: by how
-much they say about their quality.
+Positions come from GGA; where a log has none that can be used, from the others of READ_FOR_POSITIONS in their order: by
+how much they say about their quality.
 
 Where each kind holds them is told in ``kinds``.
 """
@@ -14,7 +14,8 @@ import numpy as np
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.logs.decimals import parse_decimals
-from sccal.logs.nmea.kinds import LAYOUTS, READ_FOR_POSITIONS, Kind, Position
+from sccal.logs.limits import SIGMA_LIMIT_M
+from sccal.logs.nmea.kinds import INERTIAL, LAYOUTS, READ_FOR_POSITIONS, Kind, Position
 from sccal.logs.nmea.quality import stated_quality
 from sccal.logs.nmea.sentences import Sentences
 from sccal.logs.nmea.times import Dated
@@ -68,6 +69,9 @@ def best_kind(dated: Dated, source: str, notices: list[Notice]) -> Positions | N
         what = f"{LAYOUTS[best.kind].name} sentences read for their positions because {why}"
         serious = best.kind == Kind.RMC or few
         notices.append(Notice(source, what, int(best.rows.size), severity="warning" if serious else "info"))
+    if best.kind in INERTIAL:
+        what = "positions of an inertial solution, which its filter has smoothed; BESTGNSSPOSA would have none of that"
+        notices.append(Notice(source, what, int(best.rows.size), severity="warning"))
     return best
 
 
@@ -136,6 +140,16 @@ def altitude(fixes: Sentences, kind: Kind) -> Floats:
         return altitude_m
     separation_m = fixes.number(fields.separation_m)
     return np.where(np.isfinite(separation_m), altitude_m + separation_m, altitude_m)
+
+
+def own_sigmas(fixes: Sentences, kind: Kind) -> tuple[Floats, Floats] | None:
+    """East and north sigmas (m,) that the sentences state, NaN where they state none; None for kinds without."""
+    fields = position_of(kind).sigmas_m
+    if fields is None:
+        return None
+    east, north = (fixes.number(field) for field in fields)
+    stated = (east > 0) & (north > 0)
+    return tuple(np.where(stated, np.minimum(sigma, SIGMA_LIMIT_M), np.nan) for sigma in (east, north))  # type: ignore[return-value]
 
 
 def extras(fixes: Sentences, kind: Kind) -> dict[str, Floats]:

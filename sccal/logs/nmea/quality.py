@@ -20,12 +20,13 @@ def stated_quality(own: Sentences, position: Position) -> Ints:
     if claim.form == "number":
         quality = _numbered(own, field, claim)
     elif claim.form == "word":
-        quality = worded(own, field, claim.read)
+        quality = worded(own, field, claim.read, claim.others)
     else:
         letters = own.letter(field)[:, None] if claim.form == "letter" else own.letters(field, _CONSTELLATIONS)
         quality = _best(letters, claim.read)
     if position.status is not None:
-        quality = np.where(own.letter(position.status) != ord("A"), NO_FIX, quality)
+        holds = worded(own, position.status, dict.fromkeys(position.holds, 1), 0)
+        quality = np.where(holds == 1, quality, NO_FIX)
     return quality
 
 
@@ -47,10 +48,10 @@ def _best(letters: Bytes, read: Mapping[str, int]) -> Ints:
     return stated
 
 
-def worded(own: Sentences, field: int, read: Mapping[str, int]) -> Ints:
-    """What each text in field ``field`` stands for (n,); -1 for any other."""
+def worded(own: Sentences, field: int, read: Mapping[str, int], others: int = NOT_STATED) -> Ints:
+    """What each text in field ``field`` stands for (n,); ``others`` for any other."""
     begin, end = own.span(field)
-    quality = np.full(begin.size, NOT_STATED, dtype=np.int64)
+    quality = np.full(begin.size, others, dtype=np.int64)
     for word, code in read.items():
         same = own.letters(field, len(word)) == np.frombuffer(word.encode(), dtype=np.uint8)
         quality[same.all(axis=1) & (end - begin == len(word))] = code

@@ -13,10 +13,11 @@ import numpy as np
 
 from sccal.arrays import Bools
 from sccal.errors import DataError
+from sccal.logs.compressed import bytes_of
 from sccal.logs.decimals import words_of
 from sccal.logs.nmea.fixes import read_fixes
 from sccal.logs.nmea.headings import HEADING_NAMES, read_heading
-from sccal.logs.nmea.kinds import LAYOUTS, READ, READ_FOR_SPEEDS
+from sccal.logs.nmea.kinds import COURSES, LAYOUTS, READ, READ_FOR_POSITIONS
 from sccal.logs.nmea.received import with_receive_times
 from sccal.logs.nmea.sentences import Sentences, all_lower, find_sentences, kinds_in, names_of
 from sccal.logs.nmea.times import Dated, date_sentences
@@ -24,6 +25,7 @@ from sccal.logs.set_clock import carried_on
 from sccal.logs.streams import FixStream, HeadingStream, Notice
 from sccal.logs.text import as_utf8
 
+POSITION_NAMES = ", ".join(LAYOUTS[kind].name for kind in READ_FOR_POSITIONS)
 _MOST_NAMES = 12
 _SHOWN_FROM, _SHOWN = 4096, 60
 _LONG_MESSAGE = re.compile(rb"#[A-Z][A-Z0-9]{3,}")
@@ -37,7 +39,7 @@ def read_nmea(path: Path) -> tuple[FixStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file, no sentence, or no fix.
     """
-    return parse_nmea(_bytes_of(path), path.name, path)
+    return parse_nmea(bytes_of(path), path.name, path)
 
 
 def read_nmea_heading(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
@@ -46,7 +48,7 @@ def read_nmea_heading(path: Path) -> tuple[HeadingStream, tuple[Notice, ...]]:
     Raises:
         DataError: unreadable file, no sentence, or no heading.
     """
-    return parse_nmea_heading(_bytes_of(path), path.name, path)
+    return parse_nmea_heading(bytes_of(path), path.name, path)
 
 
 def parse_nmea(raw: bytes, source: str, path: Path | str | None = None) -> tuple[FixStream, tuple[Notice, ...]]:
@@ -59,7 +61,7 @@ def parse_nmea(raw: bytes, source: str, path: Path | str | None = None) -> tuple
     dated, count, notices = _dated(raw, source, where)
     fixes = read_fixes(dated, source, notices)
     if fixes is None:
-        why = "; ".join(str(notice) for notice in notices) or "no GGA, GNS, PTNL,GGK, KSXT or RMC with a time"
+        why = "; ".join(str(notice) for notice in notices) or f"no {POSITION_NAMES} with a time"
         raise DataError(f"{where}: no position fix in {count} sentences ({len(raw)} bytes): {why}")
     return fixes, tuple(notices)
 
@@ -80,20 +82,13 @@ def parse_nmea_heading(
     heading = read_heading(dated, source, notices)
     if heading is None:
         met = [str(notice) for notice in notices] or [f"no {HEADING_NAMES}"]
-        courses = int(kinds_in(dated.sentences.kind, READ_FOR_SPEEDS).sum())
+        courses = int(kinds_in(dated.sentences.kind, COURSES).sum())
         if courses:
             met.append(f"{courses} RMC, KSXT or VTG state a course over ground, which is no heading")
         met += [str(notice) for notice in told if "passed over" in notice.what]
         why = "; ".join(met)
         raise DataError(f"{where}: no heading in {count} sentences ({len(raw)} bytes): {why}")
     return heading, tuple(notices)
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def _dated(raw: bytes, source: str, where: str) -> tuple[Dated, int, list[Notice]]:
@@ -119,7 +114,9 @@ def _shown(raw: bytes) -> str:
     """The beginning of the first line with anything in it, for messages."""
     named = _LONG_MESSAGE.search(raw[:_SHOWN_FROM])
     if named is not None:
-        return f"{named[0].decode()}, a long message that is not read for positions; log GGA or KSXT beside it"
+        return (
+            f"{named[0].decode()}, a long message that is not read for positions; log GGA, KSXT or BESTPOSA beside it"
+        )
     lines = raw[:_SHOWN_FROM].split()
     text = lines[0][:_SHOWN].decode("ascii", errors="replace") if lines else ""
     shown = "".join(letter if letter.isprintable() else "?" for letter in text) or "blank"

@@ -63,8 +63,10 @@ _NAMED_AFTER = [
 """Makers' addresses of four letters, and the names of sentences in the field after them."""
 _ASHTECH_NAMES = {Kind.PASHR_POS: _pattern(b"POS,"), Kind.PASHR_ATT: _pattern(b"ATT,")}
 """In the field after the address ``$PASHR``."""
-_LONG_NAMES = (b"HEADINGA,", b"HEADING2A,")
-"""Ends of the names of long messages; where none is in a file, ``#`` and ``;`` part nothing."""
+_LONG_NAMES = (b"HEADINGA,", b"HEADING2A,", *(f"#{LAYOUTS[kind].name},".encode() for kind in LONG))
+"""Of long messages; where none is in a file, ``#`` and ``;`` part nothing."""
+_REST = {Kind.BEST_GNSS_POS: _pattern(b"POSA,")}
+"""What follows the first eight letters of names that begin as others do."""
 _TALKER_BITS = np.uint64(16)
 _LONG_ADDRESSES = {kind: _pattern(f"{first.name}H,".encode()) for kind, first in OF_SECOND_ANTENNA.items()}
 """After the talker."""
@@ -199,7 +201,8 @@ def find_sentences(raw: bytes) -> Sentences:
     high, low = _HEX[data[np.minimum(star + 1, size)]], _HEX[data[np.minimum(star + 2, size)]]
     has_checksum = (star + 2 < end) & (high < 16) & (low < 16)
     right = has_checksum & (_sums(data, start, stop) == high * 16 + low) & (stop > start + 1)
-    long = has_checksum & kinds_in(kind, (Kind.KSXT, *LONG)) & (star + LONG_CHECKSUM_DIGITS < end)
+    may_be_long = kinds_in(kind, (Kind.KSXT, *LONG)) | (data[start] == ord("#"))
+    long = has_checksum & may_be_long & (star + LONG_CHECKSUM_DIGITS < end)
     long &= _with_long_checksum(raw, long & (_HEX[data[np.minimum(star + 3, size)]] < 16), start, star)
     right |= long
     folded = np.flatnonzero(has_checksum & ~right & all_lower(words, start))
@@ -301,6 +304,8 @@ def _kinds(words: Words, start: Ints, stop: Ints) -> tuple[Kinds, NDArray[np.uin
         named = address[own]
         for name, pattern in _NAMES:
             hit = _reads(named, pattern)
+            if name in _REST:
+                hit &= _reads(words[start[own] + 9], _REST[name])
             if hit.any():
                 kind[own[hit]] = name
                 own, named = own[~hit], named[~hit]

@@ -33,6 +33,8 @@ UNIX_FROM_S = 1e9
 """Receive times from here on (2001) are Unix time; smaller ones count from an arbitrary zero."""
 
 _LONG_AGO_DAY = 14610  # 2010-01-01
+_GPS_DAY = 3657.0  # 1980-01-06
+_MOST_WEEKS = 10_000
 _TEN_TO = 10 ** np.arange(19, dtype=np.int64)
 _MOST_PLACES = 9
 _LARGEST_STEP_S = 20
@@ -278,6 +280,8 @@ def days_stated(own: Sentences, date: Date) -> Floats:
         day, month, year = (own.decimals(field) for field in date.fields)
         good = day.good & month.good & year.good & (day.places + month.places + year.places == 0)
         return _days(day.mantissa, month.mantissa, year.mantissa, good)
+    if date.form in ("week,s", "week,ms"):
+        return _days_of_weeks(own, date)
     stated = own.decimals(date.fields[0])
     good = stated.good & (stated.mantissa >= 0)
     if date.form == "stamp":
@@ -290,6 +294,14 @@ def days_stated(own: Sentences, date: Date) -> Floats:
         return _days(first, second, years, good)
     american = _days(second, first, years, good)
     return american if np.isfinite(american).any() else _days(first, second, years, good)
+
+
+def _days_of_weeks(own: Sentences, date: Date) -> Floats:
+    """The same of GPS weeks and what has passed of them; week 0 is that of a receiver that knows no time yet."""
+    week, of_week = own.number(date.fields[0]), own.number(date.fields[0] + 1)
+    utc_s = np.round(of_week / (1000.0 if date.form == "week,ms" else 1.0) - LEAP_SECONDS, 3)
+    good = (week > 0) & (week < _MOST_WEEKS) & (of_week >= 0)
+    return np.where(good, _GPS_DAY + 7.0 * np.floor(week) + np.floor(utc_s / DAY_S), np.nan)
 
 
 def _days(day: Ints, month: Ints, year: Ints, good: Bools) -> Floats:
