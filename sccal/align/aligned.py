@@ -10,6 +10,7 @@ import numpy as np
 
 from sccal.align.accuracy import QUALITY_NAMES, SIMULATOR_QUALITY, table_sigma_m, usable
 from sccal.align.agreement import check_agreement
+from sccal.align.antenna import antenna_by_path
 from sccal.align.clock_motion import MotionClock
 from sccal.align.clocks import require_overlap
 from sccal.align.codes import by_scatter
@@ -128,6 +129,16 @@ class Aligned:
         return median(self.fix_east_m) + 1j * median(self.fix_north_m)
 
     @cached_property
+    def antenna_m(self) -> tuple[float, float] | None:
+        """Roughly how far ahead and to the left of the middle the antenna is; None where the log does not show it."""
+        first, last = self.span_s
+        inside = (self.fix_t_s >= first) & (self.fix_t_s <= last)
+        t_s = self.fix_t_s[inside]
+        path = np.interp(t_s, self.wheel_t_s, self.path_along_yaw)
+        yaw = np.interp(t_s, self.heading_t_s, self.yaw_rad)
+        return antenna_by_path(t_s, (self.fix_east_m + 1j * self.fix_north_m)[inside], path, yaw)
+
+    @cached_property
     def standing_s(self) -> Spans:
         """Stretches of some seconds and more in which both wheels stand."""
         most_rad = dither_rad(self.vehicle.wheel_radius_m, self.vehicle.ticks_per_rev)
@@ -188,7 +199,8 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     # A receiver without receive times gives no path on the wheels' clock to compare its fixes with.
     agreed = one_clock and (turned.offset_s != 0.0 or not np.isfinite(fixes.host_t_s).any())
     path = path_along(heading.t_s, yaw, wheels, run.vehicle)
-    compared = fixes_by_motion(fixes, path, t_s, timed, whole, agreed)
+    unseen = clock.source == "utc" and not one_clock
+    compared = fixes_by_motion(fixes, path, t_s, timed, whole, agreed, unseen)
     notices += compared.notices
     if (moved := compared.clock) is not None:
         t_s, before_t_s, clock = moved.moved(t_s), moved.moved(before_t_s), moved.after(clock)
@@ -279,7 +291,7 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
         heading_convention=heading.convention,
         yaw_floor_rad=OF_ROUNDING * step_of(heading.yaw_rad),
         fix_floor_m=(OF_ROUNDING * steps_m[0], OF_ROUNDING * steps_m[1]),
-        moved={} if one_clock else _moved(turned, compared.clock),
+        moved={} if one_clock else _moved(turned, None if unseen else compared.clock),
     )
     check_signs(aligned)
     return replace(aligned, notices=(*aligned.notices, *check_agreement(aligned)))

@@ -23,6 +23,8 @@ from sccal.results.clock import Clock
 
 LATENCY_S = 0.3
 """Receivers and radio links are late by as much; what is more is a matter of clocks."""
+USUAL_SKEW = 5e-5
+"""Crystals of computers are off by as much where nobody steers them."""
 CLEAR_SIGMAS = 5.0
 CLEARLY_WORSE = 4.0
 WORSE_RATIO = 1.25
@@ -123,6 +125,24 @@ def clock_by_motion(wheels: WheelPath, fixes: Fixes, span_s: tuple[float, float]
         notices.insert(0, _told(chosen, fixes, wheels))
         return MotionClock(chosen, fixes.middle_s, tuple(notices))
     return None
+
+
+def small_offset(wheels: WheelPath, fixes: Fixes) -> MotionClock | None:
+    """How far two clocks that are thought to agree do: as the motion has it, weighed against how well hosts are set.
+
+    For fixes whose times the logging computer never saw: nobody can say then what is a clock's and what a receiver's.
+    None where the motion does not tell.
+    """
+    if fixes.t_s.size < 2 or wheels.t_s.size < 2:
+        return None
+    fit = fit_clock(wheels, fixes, 0.0)
+    if fit is None or not _keeps(fit, fixes):
+        return None
+    prior = np.array([LATENCY_S, USUAL_SKEW])
+    share = prior**2 / (prior**2 + np.diag(fit.covariance))
+    scale = np.sqrt(np.outer(share, share))
+    known = replace(fit, offset_s=fit.offset_s * share[0], skew=fit.skew * share[1], covariance=fit.covariance * scale)
+    return MotionClock(known, fixes.middle_s, ())
 
 
 def _near(lag: Lag, fixes: Fixes) -> bool:

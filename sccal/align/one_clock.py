@@ -13,7 +13,7 @@ import numpy as np
 
 from sccal.align.accuracy import usable
 from sccal.align.clock_fit import Fixes, WheelPath, wheel_path
-from sccal.align.clock_motion import MotionClock, clock_by_motion
+from sccal.align.clock_motion import MotionClock, clock_by_motion, small_offset
 from sccal.align.heading_clock import HeadingClock, clock_by_turning, wheel_turning
 from sccal.align.old_fixes import find_old, telling
 from sccal.align.reference import in_order, in_plane, leading_fixes, rounding_steps_m
@@ -71,7 +71,13 @@ def path_along(heading_t_s: Floats, yaw_rad: Floats, wheels: WheelStream, vehicl
 
 
 def fixes_by_motion(
-    fixes: FixStream, path: WheelPath | None, t_s: Floats, timed: Bools, span_s: tuple[float, float], agreed: bool
+    fixes: FixStream,
+    path: WheelPath | None,
+    t_s: Floats,
+    timed: Bools,
+    span_s: tuple[float, float],
+    agreed: bool,
+    unseen: bool,
 ) -> FixTimes:
     """What path and fixes say together.
 
@@ -85,22 +91,27 @@ def fixes_by_motion(
         What the wheels' stream covers.
     agreed
         Whether the clocks are known to agree, so that only old fixes are to be found.
+    unseen
+        Whether the logging computer wrote down no time at which a fix came, so that a small offset is nobody's effect.
     """
     nothing = FixTimes(None, np.zeros(t_s.size, dtype=np.bool_), ())
     if path is None:
         return nothing
-    moved = None if agreed else _compared(fixes, path, t_s, timed, span_s)
+    moved = None if agreed else _compared(fixes, path, t_s, timed, span_s, unseen)
     old, notices = _old(fixes, path, t_s if moved is None else moved.moved(t_s), timed)
     if old.any() and not agreed:
-        moved = _compared(fixes, path, t_s, timed & ~old, span_s)
+        moved = _compared(fixes, path, t_s, timed & ~old, span_s, unseen)
         old, notices = _old(fixes, path, t_s if moved is None else moved.moved(t_s), timed)
     return FixTimes(moved, old, (*(() if moved is None else moved.notices), *notices))
 
 
 def _compared(
-    fixes: FixStream, path: WheelPath, t_s: Floats, timed: Bools, span_s: tuple[float, float]
+    fixes: FixStream, path: WheelPath, t_s: Floats, timed: Bools, span_s: tuple[float, float], unseen: bool
 ) -> MotionClock | None:
-    """How the fixes' times have to be moved, where the motion shows that they are clearly off the wheels' clock."""
+    """How the fixes' times have to be moved, where the motion shows that they are clearly off the wheels' clock.
+
+    Those that came unseen are moved by little too.
+    """
     rows = in_order(t_s, timed & usable(fixes.quality))
     rows = rows[telling(t_s[rows], fixes.lat_deg[rows] + 1j * fixes.lon_deg[rows])]
     if rows.size < FEWEST:
@@ -109,7 +120,9 @@ def _compared(
     leading = leading_fixes(placed)
     sigma = float(np.sqrt(np.median((placed.var_east_m2 + placed.var_north_m2)[leading]) / 2.0))
     places = (placed.east_m + 1j * placed.north_m)[leading]
-    return clock_by_motion(path, Fixes(placed.t_s[leading], places, sigma), span_s)
+    leading_ones = Fixes(placed.t_s[leading], places, sigma)
+    found = clock_by_motion(path, leading_ones, span_s)
+    return small_offset(path, leading_ones) if found is None and unseen else found
 
 
 def _old(fixes: FixStream, path: WheelPath, t_s: Floats, timed: Bools) -> tuple[Bools, tuple[Notice, ...]]:

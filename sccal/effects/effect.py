@@ -90,6 +90,8 @@ class Effect(ABC):
     """Whether its columns at the heading follow its own values or the robot's heading, as iron's do."""
     stage: Stage = "ground"
     """Where it stands between the counters and the body: what comes later is made of what the earlier leave."""
+    is_antenna: bool = False
+    """Whether its two parameters are where the antenna stands, forward and left: the path shows that roughly."""
     on_every_robot: bool = False
     """Whether every robot with a receiver has some of it, so that a drive that cannot show it is worth a word."""
     shown_against: Cause = "time"

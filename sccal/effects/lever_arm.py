@@ -27,6 +27,7 @@ class LeverArm(Effect):
     """Forward and left of the antenna, m."""
 
     name = "lever_arm"
+    is_antenna = True
     on_every_robot = True
     title = "antenna off the middle between the wheels"
     parameters = (

@@ -150,6 +150,11 @@ class FreeEffects:
         """(m,) about zero, in file units."""
         return np.array([free.prior_scale * one.prior_sigma for free in self.effects for one in free.parameters])
 
+    @cached_property
+    def antenna(self) -> tuple[int, int] | None:
+        """Which parameters are where the antenna stands, forward and left; None where none are."""
+        return next(((first, first + 1) for free, first, _ in self._spans if free.effect.is_antenna), None)
+
     def columns(self, problem: RunProblem, at: At, clear: tuple[Floats, Floats]) -> Columns:
         """The kernel's columns, linearised at the given values along the given path."""
         return self.columns_in(view_run(problem, at, clear), at.values, problem.timeline)

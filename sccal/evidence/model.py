@@ -16,7 +16,7 @@ from sccal.evidence.extension import Free, FreeEffects, name_in, view_run
 from sccal.evidence.joint import JointFit, fit_jointly, names_of
 from sccal.evidence.parallel import each_apart
 from sccal.filter.forward import ForwardPass
-from sccal.filter.iterate import At, RunProblem, iterate, likeliest
+from sccal.filter.iterate import At, Extension, RunProblem, iterate, likeliest
 from sccal.filter.noise import (
     COARSE_HZ,
     MISFIT,
@@ -217,11 +217,18 @@ def refitted(
     for k, before in enumerate(model.problems):
         extension = extension_of(accepted, k)
         problem = replace(before, extension=extension, noise=noises[k] if noises else before.noise)
-        tasks.append(_Refit(problem, before.noise, (_carried(model, k, extension), *starts[k : k + 1])))
+        several = [_carried(model, k, extension), *starts[k : k + 1]]
+        if _has_antenna(extension) and not _has_antenna(before.extension):
+            several.append(problem.with_antenna(several[0]))
+        tasks.append(_Refit(problem, before.noise, tuple(several)))
     ready = each_apart(partial(_prepared, reach, model.trust, model.heading_rate_hz), tasks)
     problems = [replace(task.problem, noise=noise) for task, (noise, _) in zip(tasks, ready, strict=True)]
     fit = fit_jointly(problems, [first for _, first in ready], rounds, with_stretches=True)
     return Model(tuple(accepted), tuple(problems), fit, model.heading_rate_hz)
+
+
+def _has_antenna(extension: Extension | None) -> bool:
+    return extension is not None and extension.antenna is not None
 
 
 @dataclass(frozen=True)

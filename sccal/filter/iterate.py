@@ -81,6 +81,11 @@ class Extension(Protocol):
         """(m,) about zero."""
         ...
 
+    @property
+    def antenna(self) -> tuple[int, int] | None:
+        """Which parameters are where the antenna stands, forward and left; None where none are."""
+        ...
+
     def columns(self, problem: RunProblem, at: At, clear: tuple[Floats, Floats]) -> Columns:
         """The kernel's columns for the problem's timeline; clear as from RunProblem.clear_steps."""
         ...
@@ -133,6 +138,20 @@ class RunProblem:
         """The extension's parameters at zero."""
         return At(self.centre if constants is None else constants, np.zeros(self.extra))
 
+    def at_first(self, constants: Constants | None = None) -> At:
+        """The same, but the antenna where the path shows it roughly: where a fit begins that knows nothing yet."""
+        return self.with_antenna(self.at_centre(constants))
+
+    def with_antenna(self, at: At) -> At:
+        """The same place, the antenna where the path shows it roughly, without an earlier pass that knew of none."""
+        places = None if self.extension is None else self.extension.antenna
+        roughly_m = self.aligned.antenna_m
+        if places is None or roughly_m is None:
+            return at
+        values = at.values.copy()
+        values[list(places)] = roughly_m
+        return At(at.constants, values)
+
     def clear_steps(self, constants: Constants) -> tuple[Floats, Floats]:
         """The wheels' motion freed of slip, given the ratio of the radii."""
         return clear_steps(self.aligned, self.timeline, constants.radius_right_m / constants.radius_left_m)
@@ -169,44 +188,40 @@ class RunProblem:
         return LaidOut(clear, columns._replace(fix_at=self._antenna_at(at, columns, start)), start)
 
     def _antenna_at(self, at: At, columns: Columns, start: Start) -> Floats:
-        """Heading (f,) about which the antenna turns with the robot; (0,) where it is not off the middle.
+        """Heading (f,) about which the antenna turns with the robot before the heading is known, then NaN.
 
-        Where the arms were turned with the estimate as it moves, every correction of the heading would pass for a turn
-        that shows the arm: a robot that stands "finds" it in the noise of the fixes (Huang, Mourikis and Roumeliotis
-        2010). So they are turned with the path of an earlier pass; with the AHRS before that knew the heading, and as
-        one while the robot stands first.
+        Turned with an estimate that still moves, every correction of the heading would pass for a turn that shows the
+        arm: a robot that stands "finds" it in the noise of the fixes (Huang, Mourikis and Roumeliotis 2010). So it is
+        turned with the AHRS until then, and as one while the robot stands first. (0,) where no antenna is off the
+        middle.
         """
         if not np.any(columns.fix_port < PORT_EAST):
             return np.zeros(0)
         return self._headings(at, columns, start, self.aligned.fix_t_s[self.timeline.fix_index])
 
     def _headings(self, at: At, columns: Columns, start: Start, t_s: Floats) -> Floats:
-        """The robot's heading as far as known at some times (f,), rad."""
+        """The robot's heading by the AHRS at some times (f,), rad, NaN once the filter knows it better."""
         read_s = self.aligned.heading_t_s[self.timeline.heading_index]
         read = self.aligned.yaw_rad[self.timeline.heading_index] - columns.heading_known
         read = read - columns.heading @ at.values[columns.heading_param]
-        first = (read_s > start.moving_from_s - STOOD_S) & (read_s <= max(start.moving_from_s, read_s[0]))
-        read = np.where(read_s <= start.moving_from_s, read[first].mean(), read)
-        path = at.path
-        if path is None or path.timeline.out_t_s.size < LEAST_PATH:
-            return np.asarray(np.interp(t_s, read_s, read) - start.offset_rad)
-        out_s, known = path.timeline.out_t_s, np.unwrap(path.state[:, THETA])
-        from_s = self._known_from_s
-        beside = (out_s >= from_s) & (out_s < from_s + STOOD_S)
-        turned = np.exp(1j * (np.interp(out_s, read_s, read) - known))
-        offset = float(np.angle(turned[beside].sum())) if beside.any() else start.offset_rad
-        early = np.interp(t_s, read_s, read) - offset
-        # As it was before the fix itself: with what each fix has taught, its own noise would seem to show the arm.
-        before = np.maximum(np.searchsorted(out_s, t_s) - 1, 0)
-        turned_rad = self._turned_by_wheels(at.constants)
-        since = np.interp(t_s, self.timeline.t_s, turned_rad) - np.interp(out_s, self.timeline.t_s, turned_rad)[before]
-        return np.where(t_s < from_s, early, known[before] + since)
+        stood = read_s <= start.moving_from_s
+        last = stood & (read_s > start.moving_from_s - STOOD_S)
+        if last.any():
+            read = np.where(stood, read[last].mean(), read)
+        offset = self._offset_where_known(at.path, read_s, read, start.offset_rad)
+        return np.where(t_s < self._known_from_s, np.interp(t_s, read_s, read) - offset, np.nan)
 
-    def _turned_by_wheels(self, constants: Constants) -> Floats:
-        """Heading by the wheels alone at every event (n,), rad, from zero."""
-        right_m = constants.radius_right_m * self.timeline.right_rad
-        left_m = constants.radius_left_m * self.timeline.left_rad
-        return np.cumsum(right_m - left_m) / constants.track_m
+    def _offset_where_known(self, path: ForwardPass | None, read_s: Floats, read: Floats, otherwise: float) -> float:
+        """How far the readings (h,) are off the heading of an earlier pass as soon as that knows it.
+
+        ``otherwise`` where it does not show the path.
+        """
+        if path is None or path.timeline.out_t_s.size < LEAST_PATH:
+            return otherwise
+        out_s, from_s = path.timeline.out_t_s, self._known_from_s
+        beside = (out_s >= from_s) & (out_s < from_s + STOOD_S)
+        off = np.exp(1j * (np.interp(out_s[beside], read_s, read) - path.state[beside, THETA]))
+        return float(np.angle(off.sum())) if beside.any() else otherwise
 
     @cached_property
     def _known_from_s(self) -> float:

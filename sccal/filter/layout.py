@@ -91,7 +91,7 @@ class Columns(NamedTuple):
     fix: Floats  # (f, kf)
     fix_port: Rows  # (kf,) int32
     fix_param: Rows  # (kf,) int32
-    fix_at: Floats  # (f,) rad, the heading about which the antenna turns with the robot, or (0,): the current estimate
+    fix_at: Floats  # (f,) rad, the heading about which the antenna turns with the robot; NaN, or (0,): the current one
 
 
 class Model(NamedTuple):

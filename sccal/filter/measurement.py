@@ -88,7 +88,7 @@ def expect_fix(
     x, p, P, V = belief.x, belief.p, belief.core, belief.slope
     m = p.shape[0]
     at = x[THETA]
-    if columns.fix_at.shape[0] > 0:
+    if columns.fix_at.shape[0] > 0 and not math.isnan(columns.fix_at[f]):
         at = x[THETA] - wrap_angle(x[THETA] - columns.fix_at[f])
         at = at if math.fabs(x[THETA] - at) < FAR_RAD else x[THETA]
     ct = math.cos(at)

@@ -125,7 +125,7 @@ def estimate_noise(
     """
     search = Search(aligned, start, replace(options, soft_gate=True), extension)
     coarse, fine = search.timelines(heading_rate_hz)
-    rough = first or search.problem(coarse, search.levels.centre).at_centre(coarse_constants(aligned, start))
+    rough = first or search.problem(coarse, search.levels.centre).at_first(coarse_constants(aligned, start))
     known = [search.levels.logs(one) for one in near]
     if reach in (Reach.NEAR, Reach.LOOK):
         found = search.climbed(fine if reach is Reach.NEAR else coarse, known[0], rough)
@@ -151,7 +151,7 @@ def misfit_noise(
     for _ in range(MISFIT_ROUNDS):
         noise = Noise(MISFIT_HEADING_RAD, STILL, 20.0, fix_m / stated_m, STILL, 40.0, slip, MISFIT, {}, stated_m)
         problem = RunProblem(aligned, timeline, start, noise, replace(options, soft_gate=True), extension)
-        values, found = iterate(problem, problem.at_centre() if at is None else at, 3, with_sigmas=False)
+        values, found = iterate(problem, problem.at_first() if at is None else at, 3, with_sigmas=False)
         at = At(Constants.of(values), values[4:], found)
         fix_nis = float(np.mean(found.fix_nu_m**2 / found.fix_var_m2[:, :2]))
         heading_nis = float(np.mean(found.heading_nu_rad**2 / found.heading_var_rad2))

@@ -31,7 +31,7 @@ MISSING = (
     ("missed_left=0.03,9",),
     ("eccentric_right=0.04,0", "base_shift=0.3,-0.2,90"),
     ("heading_smoothing=0.8",),
-    ("fix_smoothing=0.9",),
+    ("fix_smoothing=0.7",),
 )
 
 each_log = pytest.mark.parametrize("texts", MISSING, ids=" and ".join)

@@ -7,11 +7,12 @@ import pytest
 
 from sccal.effects.catalogue import CATALOGUE
 from sccal.evidence.extension import Free
-from sccal.evidence.model import Accepted, refitted
+from sccal.evidence.model import Accepted, bare_model, refitted
 from sccal.filter.iterate import At
 from sccal.filter.layout import BASE_STATES
+from sccal.filter.options import FilterOptions
 from sccal.filter.start import Constants
-from tests.evidence.logs import aligned, bare
+from tests.evidence.logs import HEADING_HZ, aligned, bare
 
 ARM = (2.2, -0.6)
 FAR = "lever_arm=2.2,-0.6"
@@ -45,6 +46,16 @@ def test_a_far_antenna_is_not_held_back_by_where_the_run_was_thought_to_start():
     found = model.path(0)
     first = found.fix_nu_m[0] / np.sqrt(found.fix_var_m2[0, :2])
     assert np.abs(first).max() < 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_far_antenna_is_found_on_rows_whose_turns_look_like_outliers_without_it(seed):
+    log = aligned("lever_arm=2.2,-0.3", path="rows", duration_s=210.0, seed=seed)
+    first = bare_model([log], FilterOptions(), HEADING_HZ)
+    model = refitted(first, [Accepted(Free(CATALOGUE["lever_arm"]))])
+    sigma = np.sqrt(np.diag(model.fit.all_robust))[3:]
+    assert np.all(np.abs(model.fit.values[3:] - (2.2, -0.3)) < 4.0 * sigma)
+    assert np.all(sigma < 0.02)
 
 
 def test_a_robot_that_stands_shows_nothing_of_its_antenna():

@@ -58,7 +58,8 @@ def make(
     east, north = np.cumsum(step * np.cos(theta)), np.cumsum(step * np.sin(theta))
     if arms_elsewhere:
         turns = 2.0 * np.pi * rng.integers(-1, 2, f)
-        columns = columns._replace(fix_at=theta[fix_row >= 0] + rng.normal(0.0, 0.1, f) + turns)
+        elsewhere = theta[fix_row >= 0] + rng.normal(0.0, 0.1, f) + turns
+        columns = columns._replace(fix_at=np.where(rng.random(f) < 0.8, elsewhere, np.nan))
     far_heading, far_fix = rng.random(h) < outliers, rng.random(f) < outliers
     events = K.Events(
         t_s=t,

@@ -58,7 +58,7 @@ def fix_reading(x, row, columns):
         east = east + part * (port == K.PORT_EAST)
         north = north + part * (port == K.PORT_NORTH)
     at = x[2]
-    if columns.fix_at.size:
+    if columns.fix_at.size and np.isfinite(columns.fix_at[row]):
         # About another heading: linear in the state, the product of two differences left out.
         beyond = x[2] - columns.fix_at[row]
         beyond = beyond - 2 * np.pi * np.floor((np.real(beyond) + np.pi) / (2 * np.pi))
