@@ -101,7 +101,8 @@ def test_loose_variance_stands_between_the_two_samples(aligned_by_hand):
 @settings(max_examples=60)
 def test_a_part_holds_only_what_is_between_its_ends(aligned_by_hand, log, begin, end):
     whole_s = log["wheel_t_s"][-1] - log["wheel_t_s"][0]
-    first, last = (float(log["wheel_t_s"][0] + share * whole_s) for share in (begin, end))
+    inside = (float(log["wheel_t_s"][0] + share * whole_s) for share in (begin, end))
+    first, last = (min(at_s, float(log["wheel_t_s"][-1])) for at_s in inside)
     aligned = aligned_by_hand(**log)
     assume(not aligned.standing_s)
     timeline = build_timeline(aligned, heading_rate_hz=np.inf, fix_rate_hz=np.inf, between_s=(first, last))
