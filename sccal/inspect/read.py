@@ -12,7 +12,6 @@ from sccal.align.signs import slope_through_origin
 from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.inspect.place import legs, placed_fixes
-from sccal.logs.encoder import encoder_table
 from sccal.logs.folder import RunFolder
 from sccal.logs.messages.read import LooseStreams, read_loose_streams
 from sccal.logs.names import VEHICLE_FILE
@@ -198,7 +197,7 @@ def _stand_in(
 
     Raises DataError where there are no wheels, or no fixes to scale them by.
     """
-    table = encoder_table(folder.wheel_path)
+    table = folder.wheel_table()
     in_ticks = "left_ticks" in table.columns and "right_ticks" in table.columns
     unit = "ticks" if in_ticks else "rad"
     t_s, left, right = (table.columns[name] for name in ("t", f"left_{unit}", f"right_{unit}"))
