@@ -22,8 +22,8 @@ from sccal.logs.streams import Notice
 _LOOK_BYTES = 8192
 _MOST_WORDS = 40
 _SAMPLE_ROWS = 1000
-_COMMA = re.compile(rb"(?<![\d.,])[-+]?\d*,\d+(?![\d.,])")
-_POINT = re.compile(rb"(?<![\d.,])[-+]?\d*\.\d+(?![\d.,])")
+_COMMA = re.compile(rb"(?<![\d.,:])[-+]?\d*,\d+(?![\d.,])")
+_POINT = re.compile(rb"(?<![\d.,:])[-+]?\d*\.\d+(?![\d.,])")
 _QUOTED = re.compile(rb'"([-+]?\d*),(\d+)"')
 _DAY_S = 86400.0
 _HALF = 0.5
