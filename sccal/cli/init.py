@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from sccal.cli.app import app
+from sccal.errors import Exit
+from sccal.logs.names import VEHICLE_FILE
 
 
 @app.command("init")
@@ -17,7 +19,7 @@ def init(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="The file to write, instead of vehicle.toml in LOGS.", show_default=False),
+        typer.Option("--out", "-o", help=f"The file to write, instead of {VEHICLE_FILE} in LOGS.", show_default=False),
     ] = None,
     radius_m: Annotated[
         float | None, typer.Option(help="Wheel radius (m) by the tape measure.", show_default=False)
@@ -38,3 +40,5 @@ def init(
     proposal = propose(logs, Told(radius_m, ticks_per_turn, crs).checked())
     write_new(place, proposal.text, force)
     print(proposal_text(proposal, place, logs, columns()), end="")
+    if proposal.refusal:
+        raise typer.Exit(int(Exit.DATA))

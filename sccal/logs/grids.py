@@ -15,6 +15,10 @@ PLACE_DEG = (45.0, 0.0)
 """Latitude and longitude of a local plane's origin: any place but the poles would do, where no receiver's zero lies."""
 
 
+_CELL_M = 1e4
+"""Small enough for the projection, and large enough for runs of one place to share it."""
+
+
 def is_of_metres(crs: str) -> bool:
     """Whether an EPSG code is that of a projected grid. Raises ValueError where there is no such code."""
     from pyproj import CRS
@@ -36,9 +40,13 @@ def lat_lon_of_grid(east_m: Floats, north_m: Floats, crs: str) -> tuple[Floats, 
 
 
 def lat_lon_of_plane(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
-    """Latitude and longitude (n, deg) of places (n) in a local plane."""
+    """Latitude and longitude (n, deg) of places (n) in a local plane, without whole cells of _CELL_M.
+
+    So coordinates of a grid that nobody names, far from their zero, keep their lengths too.
+    """
     from pyproj import Proj
 
     lat, lon = PLACE_DEG
-    lon_deg, lat_deg = Proj(proj="aeqd", lat_0=lat, lon_0=lon, ellps="WGS84")(east_m, north_m, inverse=True)
+    east, north = (one - _CELL_M * np.round(np.median(one) / _CELL_M) if one.size else one for one in (east_m, north_m))
+    lon_deg, lat_deg = Proj(proj="aeqd", lat_0=lat, lon_0=lon, ellps="WGS84")(east, north, inverse=True)
     return np.asarray(lat_deg), np.asarray(lon_deg)

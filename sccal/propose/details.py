@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sccal.logs.limits import HEIGHT_LIMIT_M
-from sccal.logs.mapping import LOCAL, shown
+from sccal.logs.mapping import LOCAL
 from sccal.logs.quality_words import qualities_of_words
 from sccal.propose import words
 from sccal.propose.places import Places
@@ -39,19 +39,23 @@ def details_of(places: Places) -> Details:
     quality = next((name for name in names if words.has(name, words.QUALITY) and _is_quality(table, name)), None)
     if quality is not None:
         columns["quality"] = quality
-        why.append(f"{shown(quality)} is the fixes' quality, read in GGA's codes (4 RTK fixed, 5 float, 1 autonomous)")
+        why.append(
+            f"{words.called(quality)} is the fixes' quality, read in GGA's codes (4 RTK fixed, 5 float, 1 autonomous)"
+        )
     height = next((name for name in names if _is_called_height(places, name) and _is_height(table, name)), None)
     if height is not None and places.crs != LOCAL and height != quality:
         columns["height"] = height
-        why.append(f"{shown(height)} is the height in metres")
+        why.append(f"{words.called(height)} is the height in metres")
     sigma = next((name for name in names if words.has(name, words.SIGMA) and name not in columns.values()), None)
     if sigma is not None and sigma in table.numbers:
         middle = float(np.nanmedian(table.numbers[sigma]))
         if 0.0 < middle < _LARGEST_SIGMA_M:
             columns["sigma"] = sigma
-            why.append(f"{shown(sigma)} is the fixes' sigma in metres: {middle:.3g} usually")
-        else:
-            doubts.append(f"{shown(sigma)} may be the fixes' sigma, and {middle:.3g} is too large for metres: left out")
+            why.append(f"{words.called(sigma)} is the fixes' sigma in metres: {middle:.3g} usually")
+        elif middle > 0.0:
+            doubts.append(
+                f"{words.called(sigma)} may be the fixes' sigma, and {middle:.3g} is too large for metres: left out"
+            )
     return Details(columns, tuple(why), tuple(doubts))
 
 

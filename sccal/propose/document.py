@@ -44,10 +44,10 @@ def document_of(facts: Facts, sections: tuple[MappedSection, ...], checks: Mappi
     """The whole text; ``checks`` are remarks by the key that they stand behind."""
     lines = [f"name = {quoted(facts.name)}"]
     if facts.ticks_per_rev is not None:
-        lines += ["", "[encoder]", _remarked(f"ticks_per_rev = {facts.ticks_per_rev!r}", checks.get("ticks_per_rev"))]
+        lines += ["", "[encoder]", _remarked(f"ticks_per_rev = {facts.ticks_per_rev:.9g}", checks.get("ticks_per_rev"))]
     lines += ["", "[nominal]"]
-    lines.append(_remarked(f"wheel_radius_m = {facts.wheel_radius_m!r}", checks.get("wheel_radius_m")))
-    lines.append(_remarked(f"track_m = {facts.track_m!r}", checks.get("track_m")))
+    lines.append(_remarked(f"wheel_radius_m = {facts.wheel_radius_m:.9g}", checks.get("wheel_radius_m")))
+    lines.append(_remarked(f"track_m = {facts.track_m:.9g}", checks.get("track_m")))
     lines += ["", "[ahrs]", f'convention = "{facts.convention}"']
     for section in sections:
         lines += ["", *_section(section)]

@@ -10,12 +10,12 @@ import numpy as np
 
 from sccal.align.signs import Slope, slope_through_origin
 from sccal.arrays import Floats
-from sccal.inspect.witnesses import courses
-from sccal.logs.mapping import ANGLE_UNITS, shown
+from sccal.logs.mapping import ANGLE_UNITS
 from sccal.logs.messages.heading import euler
 from sccal.logs.streams import Convention
 from sccal.logs.yaw_values import turn_of
 from sccal.propose import words
+from sccal.propose.motion import turns
 from sccal.propose.places import Places
 from sccal.propose.tables import Folder, Logged
 from sccal.propose.wheels import Wheels
@@ -52,7 +52,7 @@ class Heading:
     @property
     def label(self) -> str:
         """For messages."""
-        return f"{self.table.name}: {', '.join(shown(name) for name in self.columns)}"
+        return f"{self.table.name}: {', '.join(words.called(name) for name in self.columns)}"
 
 
 def heading_in(
@@ -136,12 +136,12 @@ def _judged(
         return
     if not _TRACKS_M[0] < wheels.m_per_unit / abs(turning.value) < _TRACKS_M[1]:
         return
-    course = slope_through_origin(*courses(places.path, t_s, yaw))
+    course = turns(places.path, t_s, yaw, wheels.t_s, wheels.left_sum + wheels.right_sum)
     factor = 1.0 / course.value if course.clear and course.value else 0.0
     if course.clear and not _SLOPE[0] < abs(factor) < _SLOPE[1]:
         return
     clockwise = turning.value < 0
-    name = ", ".join(shown(one) for one in columns)
+    name = ", ".join(words.called(one) for one in columns)
     what = f"{name} is the heading" if unit else f"{name} are the heading's quaternion"
     size = f", in {unit}" if unit else ""
     how = f" and {abs(factor):.2f} times as far as the path of the fixes" if course.clear else ""

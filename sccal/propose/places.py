@@ -13,10 +13,11 @@ from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.inspect.place import PlacedFixes, legs, placed_fixes
 from sccal.logs.grids import is_of_metres, lat_lon_of_grid, lat_lon_of_plane
-from sccal.logs.mapping import LOCAL, PLACE_UNITS, shown
+from sccal.logs.mapping import LOCAL, PLACE_UNITS
 from sccal.logs.nmea import read_nmea
 from sccal.logs.streams import FixStream
 from sccal.propose import words
+from sccal.propose.motion import moved_by, north_over_east
 from sccal.propose.tables import Folder, Logged
 
 FEWEST_LEGS = 10
@@ -29,6 +30,8 @@ _MOST_LAT_DEG, _MOST_LON_DEG, _FIELD_DEG = 90.0, 360.0, 2.0
 _UTM_EAST_M, _UTM_NORTH_M = (1e5, 9e5), (1.2e3, 1e7)
 """UTM: 166 to 834 km of easting, to 10000 km of northing, by its definition; a local plane is smaller."""
 _LOCAL_M = 5e4
+_STRETCH_SHOWS = 0.05
+"""Wheels and fixes agree on lengths to some percent on any heading: a smaller stretch is none."""
 _UTM_NAMED = re.compile(r"(?<!\d)([1-6]?\d)([ns])(?![a-z0-9])")
 
 
@@ -122,10 +125,9 @@ def _in_degrees(table: Logged, lat: str, lon: str, named: bool) -> Iterator[Plac
         stream = _stream(table, t_s, a, b)
         placed = _placed(stream)
         if placed is not None:
-            why = (
-                f"{shown(lat)} and {shown(lon)} are latitude and longitude: {a[0]:.5f} and {b[0]:.5f} degrees at first"
-            )
-            told = (f"{shown(lat)} is no longitude as its name says: {shown(lon)} is beyond 90 degrees",)
+            why = f"{words.called(lat)} and {words.called(lon)} are latitude and longitude"
+            why += f": {a[0]:.5f} and {b[0]:.5f} degrees at first"
+            told = (f"{words.called(lat)} is no longitude as its name says: {words.called(lon)} is beyond 90 degrees",)
             uses = {"latitude": (lat, unit), "longitude": (lon, unit)}
             yield Places(table.name, uses, "", stream, placed, named, why, told if exchanged else (), table)
             return
@@ -138,9 +140,12 @@ def _in_metres(table: Logged, east: str, north: str, crs: str, named: bool) -> P
     there = np.isfinite(lat) & np.isfinite(lon)
     stream = _stream(table, t_s[there], lat[there], lon[there])
     path = _placed(stream) or placed_fixes(replace(stream), (0.0, 0.0))
-    told = f"{shown(east)} and {shown(north)} are metres east and north, {why}"
+    told = f"{words.called(east)} and {words.called(north)} are metres east and north, {why}"
     if not named:
-        doubts = (*doubts, f"which of {shown(east)} and {shown(north)} points east is a guess: no name says so")
+        doubts = (
+            *doubts,
+            f"which of {words.called(east)} and {words.called(north)} points east is a guess: no name says so",
+        )
     uses = {"east": (east, "m"), "north": (north, "m")}
     return Places(table.name, uses, grid, stream, path, named, told, doubts, table)
 
@@ -200,6 +205,32 @@ def _placed(stream: FixStream) -> PlacedFixes | None:
     if times.size < FEWEST_LEGS or not np.isfinite(times).any():
         return None
     return placed_fixes(stream, (float(np.nanmin(times)), float(np.nanmax(times))))
+
+
+def exchanged(places: Places, wheel_t_s: Floats, counted: Floats) -> Places | None:
+    """Latitude and longitude under each other's names, where the way that the wheels go says so; else None.
+
+    A degree of longitude is shorter than one of latitude. Read in exchange, north is too long by 1/cos φ and east too
+    short by cos λ: the stretch by which the wheels go equally far every way is then cos φ cos λ, and else 1.
+    """
+    table = places.table
+    if table is None or "latitude" not in places.columns or np.abs(places.stream.lon_deg).max() > _MOST_LAT_DEG:
+        return None
+    (lat, _), (lon, _) = places.columns["latitude"], places.columns["longitude"]
+    angles = np.radians([np.median(places.stream.lat_deg), np.median(places.stream.lon_deg)])
+    if_exchanged = float(np.log(np.prod(np.cos(angles))))
+    found = float(np.log(north_over_east(moved_by(places.path), wheel_t_s, counted)))
+    if if_exchanged > -_STRETCH_SHOWS or abs(found - if_exchanged) > 0.5 * abs(found):
+        return None
+    doubt = f"{words.called(lat)} and {words.called(lon)} are exchanged, by the way that the wheels go: look at a map"
+    return next((replace(one, doubts=(doubt,)) for one in _in_degrees(table, lon, lat, True)), None)
+
+
+def moved_in_time(places: Places, by_s: float, doubt: str) -> Places:
+    """The same fixes with all of their times moved."""
+    stream = replace(places.stream, host_t_s=places.stream.host_t_s + by_s, utc_s=places.stream.utc_s + by_s)
+    path = replace(places.path, t_s=places.path.t_s + by_s)
+    return replace(places, stream=stream, path=path, doubts=(*places.doubts, doubt))
 
 
 def _is_a_path(path: PlacedFixes) -> bool:

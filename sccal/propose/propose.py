@@ -14,7 +14,7 @@ from sccal.errors import DataError, UsageError
 from sccal.inspect.read import metres_per_count, track_by_turning_m
 from sccal.logs.column_names import contract_names
 from sccal.logs.folder import listed_folder
-from sccal.logs.formats import may_be_table
+from sccal.logs.formats import MESSAGE_SUFFIXES, may_be_table
 from sccal.logs.limits import TICKS_PER_REV, WHEEL_RADIUS_M
 from sccal.logs.mapping import NMEA_FORMAT, shown
 from sccal.logs.names import AHRS_FILE, ENCODER_FILE, GNSS_FILE, NMEA_FILE, VEHICLE_FILE, natural_key
@@ -26,12 +26,16 @@ from sccal.logs.write import write_text
 from sccal.propose.details import Details, details_of
 from sccal.propose.document import Column, Facts, MappedSection, document_of
 from sccal.propose.headings import Heading, heading_in
-from sccal.propose.places import Places, places_in, require_grid
+from sccal.propose.places import Places, exchanged, places_in, require_grid
 from sccal.propose.tables import Folder, Logged, looked_into
-from sccal.propose.wheels import Wheels, WheelUnit, unit_of, wheels_in
+from sccal.propose.wheels import CLEARLY_BETTER, Wheels, WheelUnit, clock_of_wheels, unit_of, wheels_in
+from sccal.propose.words import called
 
 STAND_IN_TRACK_M = 1.0
 """Where the drive turns too little to show a track: a round number, to be put right by the user."""
+_NO_FIXES = "no fixes: no two columns that are latitude and longitude, or metres east and north, and move"
+_CANDIDATES = 12
+"""Pairs of columns that may be fixes: more are tried by nobody's patience."""
 _FOLDERS = 200
 """More runs of one vehicle show no more of its columns."""
 _CONTRACT = {
@@ -107,7 +111,10 @@ def propose(root: Path, told: Told) -> Proposal:
     """
     folders = list(_run_folders(root))
     if not folders:
-        raise DataError(f"{root}: no table (CSV, TXT, TSV, LOG, DAT) and no NMEA sentences in this folder or below")
+        raise DataError(
+            f"{root}: no table (CSV, TXT, TSV, LOG, DAT) and no NMEA sentences in this folder or below; "
+            f"{', '.join('*' + suffix for suffix in MESSAGE_SUFFIXES)} need no mapping, see sccal inspect"
+        )
     main = max(folders, key=_bytes_in)
     found = _found(looked_into(main), told)
     scaled = _scaled(found.wheels, found.places)
@@ -120,6 +127,8 @@ def propose(root: Path, told: Told) -> Proposal:
     checks = _checks(unit, bool(track_doubts))
     text = document_of(facts, sections, checks)
     refusal = _refusal(text, main)
+    if refusal and not found.places.named:
+        raise _lacks(found.folder, _NO_FIXES, [f"tried in vain: {found.places.why}"])
     doubts = (*_doubts(found), *unit.doubts, *track_doubts, *pattern_doubts, *_of_other_runs(text, main, folders))
     return Proposal(text, main, len(folders), reasons, doubts, refusal)
 
@@ -149,19 +158,17 @@ def _found(folder: Folder, told: Told) -> _Found:
     """Fixes first, then what goes with them. Raises DataError with what was seen where anything is missing."""
     candidates = places_in(folder, told.crs)
     if not candidates:
-        raise _lacks(
-            folder, "no fixes: no two columns that are latitude and longitude, or metres east and north, and move", []
-        )
-    tried = [(places, *_wheels_of(folder, places)) for places in candidates[:4]]
-    places, wheels, others = max(tried, key=lambda one: (one[1] is not None, one[1].explained if one[1] else 0.0))
+        raise _lacks(folder, _NO_FIXES, [])
+    places, wheels, others = _best_pair(folder, candidates)
+    if wheels is None and not places.named:
+        raise _lacks(folder, _NO_FIXES, [])
     if wheels is None:
-        raise _lacks(
-            folder, "no wheels: no two columns whose steps or integrals follow the way of the fixes", [places.why]
-        )
+        lack = "no wheels: no two columns whose steps or integrals follow the way of the fixes"
+        raise _lacks(folder, lack, [f"{places.file}: {places.why}"])
     details = details_of(places)
     used = {*_columns_of(places, details), (wheels.table.name, wheels.left), (wheels.table.name, wheels.right)}
     heading, like = heading_in(folder, places, wheels, frozenset(used))
-    unused = [one.why for one in candidates if one is not places and one.named][:3]
+    unused = [one.why for one in candidates if one.named and _names(one) != _names(places)][:3]
     found = (_beside("wheels", others), _beside("heading", like), _beside("fixes", unused))
     beside = tuple(one for one in found if one)
     if heading is not None:
@@ -173,6 +180,27 @@ def _found(folder: Folder, told: Told) -> _Found:
     return _Found(folder, places, details, wheels, of_receiver, beside)
 
 
+def _best_pair(folder: Folder, candidates: Sequence[Places]) -> tuple[Places, Wheels | None, tuple[str, ...]]:
+    """Of all that may be fixes those that wheels go with best; the first named ones where others are no better."""
+    best: tuple[Places, Wheels | None, tuple[str, ...]] = (candidates[0], None, ())
+    for named in candidates[:_CANDIDATES]:
+        places, wheels, others = _on_one_clock(folder, named)
+        other = None if wheels is None else exchanged(places, wheels.t_s, wheels.left_sum + wheels.right_sum)
+        if other is not None:
+            places = other
+            wheels, others = _wheels_of(folder, places)
+        if wheels is not None and wheels.explained > (best[1].explained + CLEARLY_BETTER if best[1] else 0.0):
+            best = (places, wheels, others)
+    return best
+
+
+def _on_one_clock(folder: Folder, places: Places) -> tuple[Places, Wheels | None, tuple[str, ...]]:
+    """The wheels that go with some fixes, which are moved to their clock where they share none."""
+    wheels, others = _wheels_of(folder, places)
+    moved = clock_of_wheels(folder, places) if wheels is None else None
+    return (places, wheels, others) if moved is None else (moved, *_wheels_of(folder, moved))
+
+
 def _wheels_of(folder: Folder, places: Places) -> tuple[Wheels | None, tuple[str, ...]]:
     return wheels_in(folder, places, frozenset(_columns_of(places, details_of(places))))
 
@@ -180,6 +208,10 @@ def _wheels_of(folder: Folder, places: Places) -> tuple[Wheels | None, tuple[str
 def _columns_of(places: Places, details: Details) -> Iterator[tuple[str, str]]:
     yield from ((places.file, column) for column, _ in places.columns.values())
     yield from ((places.file, column) for column in details.columns.values())
+
+
+def _names(places: Places) -> tuple[str, frozenset[str]]:
+    return places.file, frozenset(column for column, _ in places.columns.values())
 
 
 def _beside(what: str, others: Sequence[str]) -> str:
@@ -197,7 +229,7 @@ def _receiver_heading(places: Places, folder: Folder) -> HeadingStream | None:
 
 
 def _lacks(folder: Folder, what: str, seen: Sequence[str]) -> DataError:
-    tables = [f"{one.name} ({', '.join(shown(name) for name in list(one.numbers)[:12])})" for one in folder.tables]
+    tables = [f"{one.name} ({', '.join(called(name) for name in list(one.numbers)[:12])})" for one in folder.tables]
     found = "; ".join([*tables, *(f"{path.name} (NMEA)" for path in folder.sentences), *folder.odd])
     known = f"; known: {'; '.join(seen)}" if seen else ""
     return DataError(
@@ -295,7 +327,7 @@ def _means_one(folder: Path, pattern: str) -> bool:
 def _reasons(found: _Found, unit: WheelUnit, sections: Sequence[MappedSection], track_m: float) -> tuple[str, ...]:
     wheels, places, heading = found.wheels, found.places, found.heading
     tables = {one.name: one for one in (wheels.table, getattr(heading, "table", None), places.table) if one is not None}
-    lines = [f"{name}: {shown(one.clock.column)} is the time: it {one.clock.why}" for name, one in tables.items()]
+    lines = [f"{name}: {called(one.clock.column)} is the time: it {one.clock.why}" for name, one in tables.items()]
     lines += [f"{places.file}: {why}" for why in (places.why, *found.details.why)]
     lines += [f"{wheels.table.name}: {why}" for why in (*wheels.why, *unit.why)]
     if isinstance(heading, Heading):

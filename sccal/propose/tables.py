@@ -11,7 +11,7 @@ from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.logs.csv_header import LINE_LIMIT_BYTES
 from sccal.logs.formats import may_be_table
-from sccal.logs.mapping import ISO, TIME_UNITS, shown
+from sccal.logs.mapping import ISO, TIME_UNITS
 from sccal.logs.names import NMEA_FILE
 from sccal.logs.table import columns_of
 from sccal.logs.text import as_utf8
@@ -111,7 +111,7 @@ def _logged(path: Path) -> Logged:
         raise DataError(f"{path.name}: {rows} rows of numbers, at least {FEWEST_ROWS} are needed to know what they are")
     clock = _clock_of(numbers, texts)
     if clock is None:
-        names = ", ".join(shown(name) for name in header.names[:12])
+        names = ", ".join(words.called(name) for name in header.names[:12])
         raise DataError(f"{path.name}: none of its columns ({names}) rises evenly as times do")
     scale = 1.0 if clock.unit == ISO else TIME_UNITS[clock.unit]
     t_s = scale * numbers[clock.column]
@@ -141,7 +141,7 @@ def _clock_of(numbers: dict[str, Floats], texts: dict[str, list[str]]) -> Clock 
     step = _step(numbers[name])
     rate = f"({1.0 / (step * TIME_UNITS[unit]):.3g} rows a second)"
     why = f"only rises, by {step:.6g} at a time: {unit} {since or rate}"
-    doubt = f"{shown(', '.join(others))} may be times too" if others else ""
+    doubt = f"{words.called(', '.join(others))} may be times too" if others else ""
     if _unit_named(name) not in ("", unit):
         doubt = f"its name says {_unit_named(name)}, and its numbers {unit}"
     return Clock(name, unit, why, doubt)

@@ -8,13 +8,11 @@ from itertools import combinations
 
 import numpy as np
 
-from sccal.align.signs import Slope, slope_through_origin
+from sccal.align.signs import Slope
 from sccal.arrays import Floats
-from sccal.inspect.witnesses import courses
-from sccal.logs.mapping import shown
 from sccal.propose import words
-from sccal.propose.motion import Moved, moved_by, share_explained, summed
-from sccal.propose.places import Places
+from sccal.propose.motion import Moved, moved_by, share_explained, summed, turns, unwrapped
+from sccal.propose.places import Places, moved_in_time
 from sccal.propose.tables import Folder, Logged
 
 LEAST_EXPLAINED = 0.8
@@ -25,6 +23,8 @@ CLEARLY_BETTER = 0.03
 _ONE_WAY = 0.8
 """Of all travel: robots go forwards for most of the way, or their log is told apart by nothing else."""
 _MOST_COLUMNS = 24
+_APART_S = 60.0
+"""By so much two loggers of one drive are started apart."""
 _RADII_M = (0.01, 1.5)
 """Of wheels and sprockets: from a toy's to a tractor's."""
 _NEAR_ONE = (0.75, 1.33)
@@ -65,8 +65,34 @@ def wheels_in(
         return None, ()
     best = max(found, key=lambda one: (one.sided, _rank(one)))
     like = [one for one in found if one.sided == best.sided and (one.left, one.right) != (best.left, best.right)]
-    others = tuple(f"{one.table.name}: {shown(one.left)}, {shown(one.right)}" for one in like[:4])
+    others = tuple(f"{one.table.name}: {words.called(one.left)}, {words.called(one.right)}" for one in like[:4])
     return _with_sides(_with_signs(best, moved), places), others
+
+
+def clock_of_wheels(folder: Folder, places: Places) -> Places | None:
+    """The fixes moved to the clock of wheels that share no time with them; None where no columns' names say wheels.
+
+    Both logs are taken to begin together, within what people need to start two of them; the way that both go says the
+    rest. A calibration finds the exact offset by itself.
+    """
+    best: tuple[float, float, str] = (LEAST_EXPLAINED, 0.0, "")
+    for table in folder.tables:
+        begin_s, end_s = float(places.path.t_s[0]), float(places.path.t_s[-1])
+        if table.name == places.file or (table.t_s[-1] > begin_s and table.t_s[0] < end_s):
+            continue
+        for left, right in _sided_pairs(list(table.numbers)):
+            together_s = float(table.t_s[0]) - begin_s
+            for by_s in together_s + np.arange(-_APART_S, _APART_S, 0.5):
+                moved = moved_by(replace(places.path, t_s=places.path.t_s + by_s))
+                explained = max((one.explained for one in _read_best(table, left, right, moved)), default=0.0)
+                best = max(best, (explained, float(by_s), table.name))
+    if not best[2]:
+        return None
+    doubt = (
+        f"{places.file} and {best[2]} have clocks of their own, {best[1]:.1f} s apart by the motion: a calibration "
+        "finds it again, but times of one clock are better"
+    )
+    return moved_in_time(places, best[1], doubt)
 
 
 def _rank(one: Wheels) -> tuple[int, bool]:
@@ -108,11 +134,12 @@ def _are_alike(one: Wheels) -> bool:
 def _read_best(table: Logged, left: str, right: str, moved: Moved) -> Iterator[Wheels]:
     """The pair as counters or as rates, whichever goes with the fixes; nothing where neither does."""
     t_s, a, b = table.pair(left, right)
+    sided = words.side_of(left)[0] != ""
     found = []
     for is_rate in (False, True):
-        left_sum, right_sum = summed(t_s, a, is_rate), summed(t_s, b, is_rate)
+        left_sum, right_sum = (summed(t_s, unwrapped(one), is_rate) for one in (a, b))
         for sign in (1.0, -1.0):
-            explained, slope = share_explained(moved, t_s, 0.5 * (left_sum + sign * right_sum))
+            explained, slope = share_explained(moved, t_s, 0.5 * (left_sum + sign * right_sum), sided)
             found.append((explained, slope, is_rate, sign, left_sum, sign * right_sum))
     explained, slope, is_rate, sign, left_sum, right_sum = max(found, key=lambda one: one[0])
     if explained < LEAST_EXPLAINED:
@@ -128,7 +155,7 @@ def _read_best(table: Logged, left: str, right: str, moved: Moved) -> Iterator[W
         t_s,
         left_sum,
         right_sum,
-        words.side_of(left)[0] != "",
+        sided,
         one_reversed,
     )
 
@@ -140,16 +167,17 @@ def _with_signs(one: Wheels, moved: Moved) -> Wheels:
         one = replace(one, left_sum=-one.left_sum, right_sum=-one.right_sum, reversed=(True, False))
     kind = "rates" if one.is_rate else "counters"
     lows = [
-        f"{shown(name)} goes from {np.nanmin(one.table.numbers[name]):.6g} to {np.nanmax(one.table.numbers[name]):.6g}"
+        f"{words.called(name)} goes from {np.nanmin(column):.9g} to {np.nanmax(column):.9g}"
         for name in (one.left, one.right)
+        for column in [one.table.numbers[name]]
     ]
     how = "their integrals follow" if one.is_rate else "their steps follow"
     why = (
-        f"{shown(one.left)} and {shown(one.right)} are {kind} of the wheels: {how} the way of the fixes "
+        f"{words.called(one.left)} and {words.called(one.right)} are {kind} of the wheels: {how} the way of the fixes "
         f"({100 * one.explained:.0f} % of its variance); {', '.join(lows)}",
     )
     told = tuple(
-        f"{shown(name)} counts backwards: it falls while the other rises and the fixes move"
+        f"{words.called(name)} counts backwards: it falls while the other rises and the fixes move"
         for name, back in zip((one.left, one.right), one.reversed, strict=True)
         if back
     )
@@ -166,14 +194,15 @@ def _net_share(one: Wheels) -> float:
 def _with_sides(one: Wheels, places: Places) -> Wheels:
     """Left and right by the turns of the fixes' path, whatever the names say."""
     difference = one.m_per_unit * (one.right_sum - one.left_sum)
-    course = slope_through_origin(*courses(places.path, one.t_s, difference))
+    travel = one.left_sum + one.right_sum
+    course = turns(places.path, one.t_s, difference, one.t_s, travel)
     net = _net_share(one)
     if not course.clear:
         doubt = "the path of the fixes turns too little to show which wheel is the left one: the names decide"
         return replace(one, doubts=(*one.doubts, doubt), course=course)
-    turns = f"{shown(one.right)} − {shown(one.left)} rises when the path of the fixes turns"
+    told_by = f"{words.called(one.right)} − {words.called(one.left)} rises when the path of the fixes turns"
     if course.value > 0:
-        why = f"{shown(one.left)} is the left wheel: {turns} left (correlation {course.correlation:+.2f})"
+        why = f"{words.called(one.left)} is the left wheel: {told_by} left (correlation {course.correlation:+.2f})"
         doubts = one.doubts
         if net < -_ONE_WAY:
             doubts = (
@@ -181,13 +210,13 @@ def _with_sides(one: Wheels, places: Places) -> Wheels:
                 "both wheels go backwards for most of the way: if the robot did not, both are reversed and exchanged",
             )
         return replace(one, why=(*one.why, why), doubts=doubts, course=course)
-    told = f"{turns} right (correlation {course.correlation:+.2f})"
+    told = f"{told_by} right (correlation {course.correlation:+.2f})"
     if net < 0:
         why = f"both count backwards: they fall over most of the way, and {told}"
         flipped = (not one.reversed[0], not one.reversed[1])
         one = replace(one, left_sum=-one.left_sum, right_sum=-one.right_sum, reversed=flipped)
     else:
-        why = f"{shown(one.right)} is the left wheel{', whatever its name says' if one.sided else ''}: {told}"
+        why = f"{words.called(one.right)} is the left wheel{', whatever its name says' if one.sided else ''}: {told}"
         one = replace(
             one,
             left=one.right,
@@ -196,11 +225,10 @@ def _with_sides(one: Wheels, places: Places) -> Wheels:
             right_sum=one.left_sum,
             reversed=one.reversed[::-1],
         )
-    doubts = (
-        (*one.doubts, f"{shown(one.left)} is taken for the left wheel against its name: look at it")
-        if one.sided and net >= 0
-        else one.doubts
-    )
+    doubts = one.doubts
+    if one.sided and net >= 0:
+        told = f"{words.called(one.left)} is taken for the left wheel against its name: look at a map of the fixes"
+        doubts = (*doubts, told)
     return replace(
         one, why=(*one.why, why), doubts=doubts, course=Slope(-course.value, -course.correlation, course.windows)
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from sccal.logs.mapping import shown
+
 LAT = frozenset({"lat", "latitude", "breite"})
 LON = frozenset({"lon", "lng", "long", "longitude", "laenge"})
 EAST = frozenset({"e", "east", "easting", "x", "posx", "rechts", "rechtswert", "ost"})
@@ -12,7 +14,7 @@ HEIGHT = frozenset({"alt", "altitude", "height", "elevation", "ele", "hoehe"})
 UP = frozenset({"z", "h", "u", "up"})
 """Of a height where the same name with another letter is east."""
 QUALITY = frozenset({"fix", "quality", "qual", "fixtype", "fixquality", "gga"})
-SIGMA = frozenset({"sigma", "std", "stddev", "hacc", "accuracy", "acc", "sd"})
+SIGMA = frozenset({"sigma", "std", "stddev", "hacc", "accuracy", "sd"})
 HEADING = frozenset({"heading", "hdg", "yaw", "azimuth", "compass", "psi", "theta", "kurs"})
 COURSE = frozenset({"course", "cog", "track", "trk", "motion"})
 """Of a direction of travel, which is no heading."""
@@ -30,10 +32,15 @@ RIGHT = frozenset({"r", "right", "rgt", "re", "rechts", "rh", "starboard"})
 _SIDES = (("left", LEFT), ("right", RIGHT))
 
 
+def called(name: str) -> str:
+    """A column's name for a message, or its number where no line names the columns."""
+    return f"column {name}" if name.isdecimal() else shown(name)
+
+
 def parts(name: str) -> tuple[str, ...]:
-    """The words of a name, in small letters; digits stand for themselves."""
+    """The words of a name in small letters, and its digits; utm33n_east is utm, 33n and east."""
     spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
-    return tuple(re.findall(r"[a-zäöü]+|\d+", spaced.lower()))
+    return tuple(re.findall(r"(?<=utm)\d\d?[ns](?![a-z])|[a-zäöü]+|\d+", spaced.lower()))
 
 
 def has(name: str, words: frozenset[str]) -> bool:

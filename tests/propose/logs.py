@@ -7,7 +7,7 @@ mapping is used.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -57,6 +57,13 @@ class Form:
     """What a logger of metres and m/s turns the wheels' angles by."""
     noise: tuple[str, ...] = field(default=())
     """Further columns: a voltage, a temperature."""
+    rich: bool = False
+    """Whether each file has whatever else its sensor says: rates, tilt, accelerations, speed, course, satellites."""
+    reversed: tuple[bool, bool] = (False, False)
+    """Counters that count backwards, left and right."""
+    wrap_bits: int | None = None
+    fix_time: str = ""
+    """Form of the receiver's own times, where not the others'."""
 
 
 def drive(seed: int, duration_s: float = 100.0, path: str = "general", *settings: str) -> SimulatedRun:
@@ -75,8 +82,9 @@ def write_log(run: SimulatedRun, form: Form, folder: Path) -> Path:
     if form.one_file:
         _write_one(folder / form.files[0], (wheels, heading, fixes), form)
         return folder
-    for name, (t_s, columns) in zip(form.files, (wheels, heading, fixes), strict=True):
-        _write(folder / name, [(form.time_name, _times(t_s, form)), *columns], form)
+    own = replace(form, time=form.fix_time or form.time)
+    for name, (t_s, columns), how in zip(form.files, (wheels, heading, fixes), (form, form, own), strict=True):
+        _write(folder / name, [(form.time_name, _times(t_s, how)), *columns], form)
     return folder
 
 
@@ -105,11 +113,14 @@ def _times(t_s: Floats, form: Form) -> list[str]:
 
 def _wheels(run: SimulatedRun, form: Form) -> tuple[Floats, Columns]:
     t_s, log = run.encoder.host_t_s, run.encoder
-    ticks = {"left": log.left_ticks.astype(float), "right": log.right_ticks.astype(float)}
+    sign = {side: -1.0 if back else 1.0 for side, back in zip(("left", "right"), form.reversed, strict=True)}
+    ticks = {"left": sign["left"] * log.left_ticks, "right": sign["right"] * log.right_ticks}
     angle = {side: 2.0 * np.pi * one / TICKS_PER_TURN for side, one in ticks.items()}
-    true = {"left": run.wheel_angle_rad.left, "right": run.wheel_angle_rad.right}
+    true = {"left": sign["left"] * run.wheel_angle_rad.left, "right": sign["right"] * run.wheel_angle_rad.right}
     grid_s = run.motion.t_s + run.encoder.true_t_s[0] - run.motion.t_s[0]
     rate = {side: np.interp(log.true_t_s, grid_s, np.gradient(one, run.motion.step_s)) for side, one in true.items()}
+    if form.wrap_bits is not None:
+        ticks = {side: one % 2**form.wrap_bits for side, one in ticks.items()}
     written = {
         "ticks": (ticks, "%d", 1.0),
         "rad": (angle, "%.5f", 1.0),
@@ -129,6 +140,10 @@ def _wheels(run: SimulatedRun, form: Form) -> tuple[Floats, Columns]:
     further = [
         (name, [_number(form, "%.2f")(24.0 + one) for one in random.normal(size=t_s.size)]) for name in form.noise
     ]
+    if form.rich:
+        speed = 0.04 * (rate["left"] + rate["right"])
+        further += _shown(form, {"cmd_v": speed, "current": np.abs(speed) + 0.1 * random.normal(size=t_s.size)})
+        further += _shown(form, {"seq": np.arange(t_s.size, dtype=float), "battery": 25.0 - 1e-4 * np.arange(t_s.size)})
     return t_s, [*columns, *further]
 
 
@@ -144,8 +159,18 @@ def _heading(run: SimulatedRun, form: Form) -> tuple[Floats, Columns]:
             for name, axis in zip(form.heading_names, "xyzw", strict=True)
         ]
     numbers = deg if form.heading == "deg" else np.radians(deg)
+    further = []
+    if form.rich:
+        random = np.random.default_rng(run.settings.seed + 1)
+        rate = np.gradient(np.unwrap(np.radians(enu_deg)), run.ahrs.host_t_s)
+        noise = {name: random.normal(size=deg.size) for name in ("acc_x", "acc_y", "mag_x", "temp")}
+        further = _shown(form, {"roll": run.ahrs.roll_deg, "pitch": run.ahrs.pitch_deg, "gyro_z": rate, **noise})
     shown = _number(form, "%.2f" if form.heading == "deg" else "%.5f")
-    return run.ahrs.host_t_s, [(form.heading_names[0], [shown(one) for one in numbers.tolist()])]
+    return run.ahrs.host_t_s, [*further, (form.heading_names[0], [shown(one) for one in numbers.tolist()])]
+
+
+def _shown(form: Form, columns: dict[str, Floats]) -> Columns:
+    return [(name, [_number(form, "%.4f")(one) for one in values.tolist()]) for name, values in columns.items()]
 
 
 def _fixes(run: SimulatedRun, form: Form) -> tuple[Floats, Columns]:
@@ -165,6 +190,9 @@ def _fixes(run: SimulatedRun, form: Form) -> tuple[Floats, Columns]:
     ]
     if form.quality:
         columns.append((form.quality, [str(one) for one in log.quality.tolist()]))
+    if form.rich:
+        further = {"speed": log.speed_mps, "course": log.course_deg, "hdop": 0.0 * log.alt_m + 0.8, "alt": log.alt_m}
+        columns += _shown(form, {**further, "hAcc": 0.0 * log.alt_m + 0.014, "sats": 0.0 * log.alt_m + 14.0})
     return log.host_t_s, columns
 
 
