@@ -67,6 +67,7 @@ class MappedFile:
             stream,
             left_rad=-stream.left_rad if left else stream.left_rad,
             right_rad=-stream.right_rad if right else stream.right_rad,
+            source=self.path.name,
         ), notices
 
     def wheel_table(self, radius_m: float) -> Table:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pyproj import Geod, Transformer
 
+from sccal.align import align
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
 from sccal.logs.inputs import input_paths
@@ -345,3 +346,11 @@ def test_tables_that_nobody_maps_are_named_with_what_they_hold(tmp_path):
     text = str(failures[0].error)
     assert "found gps.csv, imu.csv, wheel.csv; gps.csv has in line 1 the columns t, lat, lon" in text
     assert text.endswith(f"`sccal init {place}` proposes a mapping")
+
+
+def test_what_is_said_of_the_wheels_names_their_own_file(tmp_path):
+    lat = 48.0 + np.concatenate((np.zeros(ROWS // 2), 1e-3 * np.ones(ROWS - ROWS // 2)))
+    run = read(folder_of(tmp_path, gps=table("t,lat,lon", 1e6 + T, lat, 13.0 + 1e-6 * T)))
+    with pytest.raises(DataError, match=r"wheel\.csv") as refused:
+        align(run)
+    assert "encoder.csv" not in str(refused.value)
