@@ -48,6 +48,8 @@ class Heading:
     correlation: float
     why: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    unit_shown: bool = True
+    """Whether the path of the fixes shows the unit."""
 
     @property
     def label(self) -> str:
@@ -149,8 +151,6 @@ def _judged(
     sense = f"it {'falls' if clockwise else 'rises'} when the robot turns left, so convention = "
     sense += '"ned" (clockwise, a compass)' if clockwise else '"enu" (counter-clockwise)'
     doubts = []
-    if not course.clear:
-        doubts.append(f"whether {name} is in {unit} is a guess: the path of the fixes turns too little to say")
     wanted = {"deg", "rad"} & {part for one in columns for part in words.parts(one)}
     if unit and wanted and unit not in wanted:
         doubts.append(f"{name} says {' '.join(wanted)} in its name and holds {unit}")
@@ -165,6 +165,7 @@ def _judged(
             turning.correlation,
             (why, sense),
             tuple(doubts),
+            course.clear or not unit,
         )
     )
 

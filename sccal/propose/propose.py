@@ -27,8 +27,9 @@ from sccal.propose.details import Details, details_of
 from sccal.propose.document import Column, Facts, MappedSection, document_of
 from sccal.propose.headings import Heading, heading_in
 from sccal.propose.places import Places, exchanged, places_in, require_grid
+from sccal.propose.sense import turning_by_path
 from sccal.propose.tables import Folder, Logged, looked_into
-from sccal.propose.wheels import CLEARLY_BETTER, Wheels, WheelUnit, clock_of_wheels, unit_of, wheels_in
+from sccal.propose.wheels import CLEARLY_BETTER, Wheels, WheelUnit, clock_of_wheels, unit_of, wheels_in, with_course
 from sccal.propose.words import called
 
 STAND_IN_TRACK_M = 1.0
@@ -168,6 +169,12 @@ def _found(folder: Folder, told: Told) -> _Found:
     details = details_of(places)
     used = {*_columns_of(places, details), (wheels.table.name, wheels.left), (wheels.table.name, wheels.right)}
     heading, like = heading_in(folder, places, wheels, frozenset(used))
+    if heading is not None and not (wheels.course.clear and heading.unit_shown):
+        by_path = turning_by_path(places, wheels, heading)
+        if by_path is not None and not wheels.course.clear:
+            wheels = with_course(wheels, by_path)
+            heading, like = heading_in(folder, places, wheels, frozenset(used))
+        heading = None if heading is None else replace(heading, unit_shown=heading.unit_shown or by_path is not None)
     unused = [one.why for one in candidates if one.named and _names(one) != _names(places)][:3]
     found = (_beside("wheels", others), _beside("heading", like), _beside("fixes", unused))
     beside = tuple(one for one in found if one)
@@ -347,6 +354,12 @@ def _doubts(found: _Found) -> tuple[str, ...]:
     tables = {one.name: one for one in (wheels.table, getattr(heading, "table", None), places.table) if one is not None}
     clocks = tuple(f"{name}: {one.clock.doubt}" for name, one in tables.items() if one.clock.doubt)
     own = heading.doubts if isinstance(heading, Heading) else ()
+    if isinstance(heading, Heading) and not heading.unit_shown:
+        own += (
+            f"whether {heading.label} is in {heading.unit} is a guess: the path of the fixes turns too little to say",
+        )
+    if not wheels.course.clear:
+        own += ("the path of the fixes turns too little to show which wheel is the left one: the names decide",)
     return (*clocks, *places.doubts, *found.details.doubts, *wheels.doubts, *own, *found.others)
 
 

@@ -52,7 +52,7 @@ class Wheels:
     why: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     course: Slope = field(default_factory=lambda: Slope(0.0, 0.0, 0))
-    """Of the turns of the fixes' path on the difference right − left."""
+    """Of the turns of the fixes' path on the difference right − left; not clear where the names alone say the sides."""
 
 
 def wheels_in(
@@ -196,10 +196,14 @@ def _with_sides(one: Wheels, places: Places) -> Wheels:
     difference = one.m_per_unit * (one.right_sum - one.left_sum)
     travel = one.left_sum + one.right_sum
     course = turns(places.path, one.t_s, difference, one.t_s, travel)
-    net = _net_share(one)
     if not course.clear:
-        doubt = "the path of the fixes turns too little to show which wheel is the left one: the names decide"
-        return replace(one, doubts=(*one.doubts, doubt), course=course)
+        return replace(one, course=course)
+    return with_course(one, course)
+
+
+def with_course(one: Wheels, course: Slope) -> Wheels:
+    """The pair with its sides as the turns of the fixes' path say: ``course`` is their slope on its difference."""
+    net = _net_share(one)
     told_by = f"{words.called(one.right)} − {words.called(one.left)} rises when the path of the fixes turns"
     if course.value > 0:
         why = f"{words.called(one.left)} is the left wheel: {told_by} left (correlation {course.correlation:+.2f})"
