@@ -18,6 +18,7 @@ MADE = {
     "evidence": "Model, JointFit, Posterior",
     "calibration": "Calibration, VehicleCalibration",
     "diagnose": "Diagnosis",
+    "propose": "Proposal: a vehicle.toml",
     "results": "every result, written and read",
     "report": "text, pages, figures",
     "cli": "a table and an exit code",

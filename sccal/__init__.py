@@ -32,6 +32,7 @@ Rooms, ground floor first; imports point down only
 8   diagnose     The search for what the model lacks, judged before and after.
 8   experiments  The paper's experiments, with simulated drives and with one's own.
 8   inspect      What is in a log, before anything is estimated.
+9   propose      What a user's own files hold, found by names and checked by numbers, as a vehicle.toml.
 9   summary      Many calibrations as one picture.
 9   gates        Conditions that results must keep, and whether they do.
 9   compare      What changed between two results beyond its uncertainty.

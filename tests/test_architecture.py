@@ -26,7 +26,7 @@ FLOORS = (
     {"evidence"},
     {"calibration"},
     {"diagnose", "experiments", "inspect"},
-    {"summary", "gates", "compare", "export"},
+    {"propose", "summary", "gates", "compare", "export"},
     {"report"},
     {"batch", "samples"},
     {"cli"},

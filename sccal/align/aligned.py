@@ -39,7 +39,7 @@ from sccal.align.standing import Spans, dither_rad, standing_spans
 from sccal.arrays import Bools, Complexes, Floats, Ints
 from sccal.errors import DataError
 from sccal.geodesy import TangentPlane
-from sccal.logs.names import AHRS_FILE
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE
 from sccal.logs.streams import Convention, HeadingStream, Notice, Run, Vehicle, WheelStream
 from sccal.logs.windows import Window, windows_on_clock, within
 from sccal.results.clock import Clock
@@ -173,6 +173,24 @@ def align(run: Run, withhold_s: Sequence[Window] = ()) -> Aligned:
     Raises DataError where clocks, amounts of data or signs make a calibration impossible, UsageError for windows
     outside the run.
     """
+    try:
+        aligned = _aligned(run, withhold_s)
+    except DataError as error:
+        raise DataError(_of_their_file(str(error), run)) from error
+    return replace(aligned, notices=tuple(_told_of_their_file(one, run) for one in aligned.notices))
+
+
+def _of_their_file(text: str, run: Run) -> str:
+    """What is said of the contract's file of wheels, said of the one that they were read from."""
+    return text.replace(ENCODER_FILE, run.wheels.source)
+
+
+def _told_of_their_file(notice: Notice, run: Run) -> Notice:
+    source, what, doubt = (_of_their_file(text, run) for text in (notice.source, notice.what, notice.doubt))
+    return replace(notice, source=source, what=what, doubt=doubt)
+
+
+def _aligned(run: Run, withhold_s: Sequence[Window]) -> Aligned:
     notices = list(run.notices)
     wheels, heading, fixes = run.wheels, run.heading, run.fixes
     whole = (float(wheels.t_s[0]), float(wheels.t_s[-1]))

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from sccal.errors import UsageError
-from sccal.logs.formats import MESSAGE_SUFFIXES, RUN_FILES
+from sccal.logs.formats import MESSAGE_SUFFIXES, RUN_FILES, may_be_table
 from sccal.logs.names import BAG_FILE
 from sccal.processes import ONE_THREAD, Here, Processes, Workers
 
@@ -72,9 +72,9 @@ def runs_and_bytes(paths: Sequence[Path | str], most: int) -> tuple[int, int]:
         for folder, below, files in walk:
             below[:] = [name for name in below if not name.startswith(".")]
             messages = [name for name in files if name.lower().endswith(MESSAGE_SUFFIXES)]
-            count += not _RUN_FILES.isdisjoint(files)
-            count += len(messages)
-            for name in [*messages, *_RUN_FILES.intersection(files)]:
+            tables = [name for name in files if name in _RUN_FILES or may_be_table(name)]
+            count += bool(tables) + len(messages)
+            for name in [*messages, *tables]:
                 with suppress(OSError):
                     size_bytes += Path(folder, name).stat().st_size
             folders += 1

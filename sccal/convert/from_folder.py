@@ -41,6 +41,7 @@ def tables_of_folder(source: RunSource) -> RunTables:
     """
     run, listed, folder = read_run(source), source.folder, source.path
     assert listed is not None
+    listed.require_contract("converted")
     notices = earlier_notices(folder)
     encoder = _log_table(_counts_or_angles, listed.file(ENCODER_FILE), notices)
     ahrs = gnss = nmea = None

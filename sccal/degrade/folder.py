@@ -132,6 +132,8 @@ def degrade_folder(source: RunSource, target: Path, faults: Faults, others: Coll
         DataError: a file that is to be rewritten is missing or cannot be read.
     """
     _NOTE.earlier_files(target)
+    if source.folder is not None:
+        source.folder.require_contract("degraded")
     _require_files(source.path, faults)
     notices: list[str] = []
     if faults.none:

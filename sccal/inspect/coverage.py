@@ -31,7 +31,8 @@ def stream_facts(streams: LogStreams, together: Together) -> tuple[StreamFacts, 
     """Of every stream that is there."""
     facts = []
     of_heading = AHRS_FILE if streams.heading is None else streams.heading.source
-    sources: dict[StreamName, str] = {"wheels": ENCODER_FILE, "heading": of_heading, "fixes": streams.fix_source}
+    of_wheels = ENCODER_FILE if streams.wheels is None else streams.wheels.source
+    sources: dict[StreamName, str] = {"wheels": of_wheels, "heading": of_heading, "fixes": streams.fix_source}
     for name, source in sources.items():
         t_s = together.times(name)
         if t_s.size >= 2:

@@ -12,7 +12,6 @@ from sccal.align.signs import slope_through_origin
 from sccal.arrays import Floats
 from sccal.errors import DataError
 from sccal.inspect.place import legs, placed_fixes
-from sccal.logs.encoder import encoder_table
 from sccal.logs.folder import RunFolder
 from sccal.logs.messages.read import LooseStreams, read_loose_streams
 from sccal.logs.names import VEHICLE_FILE
@@ -125,11 +124,11 @@ def _sized_by_the_rest(made: Vehicle, found: LooseStreams) -> tuple[Vehicle, boo
     wheels, fixes = found.wheels, found.fixes
     if wheels is None or fixes is None:
         return None
-    radius_m = _metres_per_count(wheels.t_s, wheels.left_rad, wheels.right_rad, fixes)
+    radius_m = metres_per_count(wheels.t_s, wheels.left_rad, wheels.right_rad, fixes)
     if radius_m is None:
         return None
     t_s, left, right, heading = wheels.t_s, wheels.left_rad, wheels.right_rad, found.heading
-    track_m = None if heading is None else _track_m(t_s, left, right, heading, radius_m)
+    track_m = None if heading is None else track_by_turning_m(t_s, left, right, heading, radius_m)
     return replace(made, wheel_radius_m=radius_m, track_m=track_m or STAND_IN_TRACK_M), track_m is not None
 
 
@@ -199,20 +198,20 @@ def _stand_in(
 
     Raises DataError where there are no wheels, or no fixes to scale them by.
     """
-    table = encoder_table(folder.wheel_path)
+    table = folder.wheel_table()
     if unit_of(table):
         plain = vehicle or Vehicle("", folder.path / VEHICLE_FILE, 1.0, STAND_IN_TRACK_M)
-        table = with_angles(table, plain, str(folder.wheel_path))
+        table = with_angles(table, plain, table.source)
     in_ticks = "left_ticks" in table.columns and "right_ticks" in table.columns
     unit = "ticks" if in_ticks else "rad"
     t_s, left, right = (table.columns[name] for name in ("t", f"left_{unit}", f"right_{unit}"))
-    m_per_count = None if fixes is None else _metres_per_count(t_s, left, right, fixes)
+    m_per_count = None if fixes is None else metres_per_count(t_s, left, right, fixes)
     if m_per_count is None:
         raise DataError(
             f"{table.source}: {table.rows_seen} rows, {t_s[0]:.3f} … {t_s[-1]:.3f} s, cannot be scaled: neither "
             f"{VEHICLE_FILE} nor the fixes say how far a count goes"
         )
-    track_m = None if heading is None else _track_m(t_s, left, right, heading, m_per_count)
+    track_m = None if heading is None else track_by_turning_m(t_s, left, right, heading, m_per_count)
     radius_m = m_per_count / (2 * np.pi) if in_ticks else m_per_count
     made = Vehicle(
         name=folder.path.resolve().name if vehicle is None else vehicle.name,
@@ -228,7 +227,7 @@ def _stand_in(
     return made, track_m is not None
 
 
-def _metres_per_count(t_s: Floats, left: Floats, right: Floats, fixes: FixStream) -> float | None:
+def metres_per_count(t_s: Floats, left: Floats, right: Floats, fixes: FixStream) -> float | None:
     """Median over legs of the fixes' displacement per mean count of both wheels; None where the two do not meet."""
     placed = placed_fixes(fixes, (float(t_s[0]), float(t_s[-1])))
     inside = (placed.t_s >= t_s[0]) & (placed.t_s <= t_s[-1])
@@ -244,7 +243,9 @@ def _metres_per_count(t_s: Floats, left: Floats, right: Floats, fixes: FixStream
     return float(np.median(np.abs(np.diff(where))[moved] / driven[moved]))
 
 
-def _track_m(t_s: Floats, left: Floats, right: Floats, heading: HeadingStream, m_per_count: float) -> float | None:
+def track_by_turning_m(
+    t_s: Floats, left: Floats, right: Floats, heading: HeadingStream, m_per_count: float
+) -> float | None:
     """The track on which the wheels turn as far as the yaw does; None where that is not clear."""
     grid = np.arange(max(t_s[0], heading.t_s[0]), min(t_s[-1], heading.t_s[-1]))
     if grid.size < 3:

@@ -48,7 +48,7 @@ def witnesses(together: Together, vehicle: Vehicle | None) -> tuple[Witness, ...
             ("heading", together.yaw_t_s, together.yaw_rad, "course of the fixes against yaw"),
         ):
             if together.meets(name) and turned.size:  # type: ignore[arg-type]
-                found.append(_turning(what, *_courses(together.fixes, t_of, turned)))
+                found.append(_turning(what, *courses(together.fixes, t_of, turned)))
         if together.meets("wheels"):
             distance = _distance(together, together.fixes)
             if distance.clear and vehicle is not None:
@@ -116,7 +116,7 @@ def _turns(together: Together) -> tuple[Floats, Floats]:
     return wheels[both], yaw[both]
 
 
-def _courses(fixes: PlacedFixes, t_of: Floats, turned: Floats) -> tuple[Floats, Floats]:
+def courses(fixes: PlacedFixes, t_of: Floats, turned: Floats) -> tuple[Floats, Floats]:
     """Change of the other stream, and of the fixes' course, between the middles of neighbouring windows."""
     window = max(2.0, fix_window_s(fixes))
     t_s = np.arange(fixes.t_s[0], fixes.t_s[-1], window)

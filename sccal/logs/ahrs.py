@@ -47,7 +47,15 @@ def ahrs_table(path: Path) -> Table:
     Raises:
         DataError: unreadable file or missing columns.
     """
-    return _of_known_unit(_without_impossible_yaws(read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad"))), path))
+    return usable_yaws(read_table(path, (("t", "yaw_deg"), ("t", "yaw_rad"))), path)
+
+
+def usable_yaws(table: Table, path: Path) -> Table:
+    """The table with its yaw in the unit of its name, and without what no AHRS gives; told in notices.
+
+    Raises DataError where nothing is left.
+    """
+    return _of_known_unit(_without_impossible_yaws(table, path))
 
 
 def heading_of_table(table: Table) -> tuple[HeadingStream, tuple[Notice, ...]]:

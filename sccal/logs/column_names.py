@@ -65,6 +65,8 @@ class Named:
     time_unit_s: float = 1.0
     plain_yaw: bool = False
     """Whether the unit of yaw_deg has to be found by its values."""
+    declared: bool = False
+    """Whether the unit of times is declared, and not to be found; it is not a number where dates are declared."""
 
 
 def folded(name: str) -> str:

@@ -11,8 +11,12 @@ from sccal.logs.text import as_utf8
 
 LINE_LIMIT_BYTES = 64 * 1024
 COLUMN_LIMIT = 1000
+_NAMES_SHOWN, _NAME_SHOWN = 12, 40
 _SEPARATOR_LINE = re.compile(r"(?i:sep)=.?")
 """What spreadsheets write first: the separator of all that follows."""
+BLANKS = " "
+"""The separator of a header whose names stand apart by any number of blanks."""
+_APART = re.compile(r"\w +\w")
 _BLANKS = b"\0 \t\r\n"
 
 
@@ -44,10 +48,26 @@ def split_header(data: bytes, path: Path) -> tuple[list[str], str, int, int]:
             f"{path}: no header line in {len(data)} bytes; the first line names the columns, such as t,yaw_deg"
         )
     separator = told if told and told in text else max(",;\t", key=text.count)
-    names = [name.strip().strip('"').strip() for name in text.split(separator)]
+    if separator not in text and _APART.search(text):
+        separator = BLANKS
+    cells = text.split() if separator == BLANKS else text.split(separator)
+    names = [name.strip().strip('"').strip() for name in cells]
     if len(names) > COLUMN_LIMIT:
         raise DataError(f"{path}: line {line} names {len(names)} columns, more than {COLUMN_LIMIT}; this is not a log")
     return names, separator, line, end + 1
+
+
+def header_in_words(path: Path) -> str:
+    """What columns the beginning of a file names, in a few words for a message: no more of it is quoted."""
+    try:
+        with path.open("rb") as file:
+            begin = as_utf8(file.read(LINE_LIMIT_BYTES))
+        names, _, line, _ = split_header(begin.replace(b"\r", b"\n"), path)
+    except (OSError, DataError):
+        return "has no header that can be read"
+    plain = ["".join(mark if mark.isprintable() else "?" for mark in name)[:_NAME_SHOWN] for name in names]
+    more = f" and {len(plain) - _NAMES_SHOWN} more" if len(plain) > _NAMES_SHOWN else ""
+    return f"has in line {line} the columns {', '.join(plain[:_NAMES_SHOWN])}{more}"
 
 
 def blank_file(path: Path, size_bytes: int) -> DataError:

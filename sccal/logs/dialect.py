@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from sccal.arrays import Bools, Floats, Ints
+from sccal.errors import DataError
 from sccal.logs.limits import TIME_LIMIT_S
 from sccal.logs.quality_words import qualities_of_words
 from sccal.logs.streams import Notice
@@ -21,8 +22,8 @@ from sccal.logs.streams import Notice
 _LOOK_BYTES = 8192
 _MOST_WORDS = 40
 _SAMPLE_ROWS = 1000
-_COMMA = re.compile(rb"(?<![\d.,])[-+]?\d*,\d+(?![\d.,])")
-_POINT = re.compile(rb"(?<![\d.,])[-+]?\d*\.\d+(?![\d.,])")
+_COMMA = re.compile(rb"(?<![\d.,:])[-+]?\d*,\d+(?![\d.,])")
+_POINT = re.compile(rb"(?<![\d.,:])[-+]?\d*\.\d+(?![\d.,])")
 _QUOTED = re.compile(rb'"([-+]?\d*),(\d+)"')
 _DAY_S = 86400.0
 _HALF = 0.5
@@ -101,6 +102,21 @@ def in_seconds(t: Floats, unit_s: float, source: str, notices: list[Notice]) -> 
             notices.append(Notice(source, f"times read as {name} since 1970", t.size, "", "warning"))
             return t * size_s
     return t
+
+
+def declared_seconds(t: Floats, unit_s: float, source: str) -> Floats:
+    """Times (n) in seconds, of the unit that vehicle.toml declares.
+
+    Raises DataError where the numbers can be no times of that unit.
+    """
+    if np.isnan(unit_s):
+        raise DataError(f'{source}: the times are numbers, and no dates as unit = "iso" says: s, ms, us or ns')
+    known = np.abs(t[np.isfinite(t)]) * unit_s
+    usual_s = float(np.median(known)) if known.size else 0.0
+    if usual_s >= TIME_LIMIT_S:
+        fits = next((name for least, _, name in _UNITS if usual_s / unit_s >= least), "seconds")
+        raise DataError(f"{source}: times of {usual_s:.4g} s lie in no year: they look like {fits} since 1970")
+    return t * unit_s
 
 
 def qualities_of_text(cells: pd.Series[Any], numbers: Floats, source: str, notices: list[Notice]) -> Floats:

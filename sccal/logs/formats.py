@@ -153,6 +153,17 @@ def message_suffix(name: str) -> str:
     return PurePath(plain_name(name)).suffix.lower()
 
 
+TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".log", ".dat", ".asc")
+"""Ends of the names under which loggers write tables."""
+_NO_TABLES = ("reference.csv", "trajectory.csv", "requirements.txt", "cmakelists.txt")
+
+
+def may_be_table(name: str) -> bool:
+    """Whether a file of this name may be a table of a user's own columns."""
+    plain = name.lower()
+    return plain.endswith(TABLE_SUFFIXES) and plain not in _NO_TABLES and not name.startswith(".")
+
+
 def message_format(path: Path) -> MessageFormat | None:
     """The row of a file that is a run on its own; None for any other file and for folders."""
     suffix = message_suffix(path.name)

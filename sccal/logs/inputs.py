@@ -47,7 +47,7 @@ def input_paths(source: RunSource) -> Iterator[tuple[str, Path]]:
     elif source.folder is None:
         yield from ((path.relative_to(run).as_posix(), path) for path in sorted(run.rglob("*")) if path.is_file())
     else:
-        yield from ((name, source.folder.file(name)) for name in source.folder.there)
+        yield from ((name, source.folder.file(name)) for name in source.folder.read_files)
     if source.vehicle_toml is not None:
         yield source.vehicle_toml.name, source.vehicle_toml
     yield from ((path.name, path) for name in (REFERENCE_FILE, MANIFEST_FILE) if (path := beside(run, name)).is_file())

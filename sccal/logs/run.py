@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path, PurePath
 
 from sccal.errors import DataError, Failure, UsageError
 from sccal.logs.compressed import is_packed, plain_name
+from sccal.logs.csv_header import header_in_words
 from sccal.logs.folder import RunFolder, listed_folder, require_rows
 from sccal.logs.formats import (
     MCAP,
@@ -19,10 +20,12 @@ from sccal.logs.formats import (
     ROS2,
     RUN_FILES,
     are_of_a_bag,
+    may_be_table,
     message_format,
     message_suffix,
     run_files_in,
 )
+from sccal.logs.mapping import FileMapping
 from sccal.logs.messages.mcap_file import RESULT_LIBRARY, library_of
 from sccal.logs.messages.parts import later_parts
 from sccal.logs.messages.read import read_message_log
@@ -31,7 +34,7 @@ from sccal.logs.one_clock import on_one_clock
 from sccal.logs.options import ReadOptions
 from sccal.logs.reference import read_reference
 from sccal.logs.streams import Run
-from sccal.logs.vehicle import MINIMAL_VEHICLE, read_vehicle
+from sccal.logs.vehicle import MINIMAL_VEHICLE, read_mapping, read_vehicle
 
 _LISTED = 8
 
@@ -59,8 +62,17 @@ class RunSource:
             return None
         if not self.path.is_dir():
             raise DataError(f"{self.path}: is not a regular file, and is not opened; copy the log itself here")
-        folder = listed_folder(self.path)
+        folder = listed_folder(self.path, self._mapping())
         return None if folder.is_bag else folder
+
+    def _mapping(self) -> FileMapping | None:
+        """What vehicle.toml says of the files; where it is broken, what has the contract's names is still read."""
+        try:
+            return None if self.vehicle_toml is None else read_mapping(self.vehicle_toml)
+        except DataError:
+            if run_files_in([entry.name for entry in self.path.iterdir()]):
+                return None
+            raise
 
 
 def discover(paths: Sequence[Path]) -> list[RunSource]:
@@ -122,7 +134,11 @@ def _lying_in(root: Path) -> str:
         return ""
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     advice = [text for ending, text in NO_LOGS.items() if any(name.lower().endswith(ending) for name in names)]
-    return "; ".join([f"; found {', '.join(names[:_LISTED])}{more}", *advice])
+    tables = [name for name in names if may_be_table(PurePath(name).name)]
+    if tables:
+        advice += [f"{tables[0]} {header_in_words(root / tables[0])}", f"`sccal init {root}` proposes a mapping"]
+    first = [*tables, *(name for name in names if name not in tables)][:_LISTED]
+    return "; ".join([f"; found {', '.join(first)}{more}", *advice])
 
 
 def read_run(source: RunSource, options: ReadOptions | None = None) -> Run:
@@ -193,6 +209,7 @@ def _folder_of(place: Path) -> Path:
 def _run_places(root: Path) -> Iterator[Path]:
     """Folders and files that are runs."""
     visited: set[str] = set()
+    mapped = _Mappings(root)
     for folder, below, files in os.walk(root, followlinks=True):
         real = os.path.realpath(folder)
         if real in visited:
@@ -203,7 +220,7 @@ def _run_places(root: Path) -> Iterator[Path]:
         if "calibration.json" in files and ENCODER_FILE not in files:
             continue
         bag = are_of_a_bag(files)
-        if bag or run_files_in(files):
+        if bag or run_files_in(files) or mapped.claims(Path(folder), files):
             yield Path(folder)
         later = later_parts(Path(folder), files)
         for name in files:
@@ -223,6 +240,30 @@ def _run_places(root: Path) -> Iterator[Path]:
 def _unpacked_beside(name: str, files: Sequence[str]) -> bool:
     """Whether a compressed file stands beside itself unpacked: the same drive is not read twice."""
     return is_packed(name) and plain_name(name) in files
+
+
+@dataclass
+class _Mappings:
+    """What the vehicle.toml files below a root say of the runs' files, each read once."""
+
+    root: Path
+    read: dict[Path, FileMapping | None] = field(default_factory=dict)
+
+    def claims(self, folder: Path, files: Sequence[str]) -> bool:
+        """Whether a folder's files are a run by the vehicle.toml that applies to it.
+
+        Where that cannot be read, whatever could be a table is: reading it then says why it is none.
+        """
+        vehicle = _nearest_vehicle(folder, self.root)
+        if vehicle is None:
+            return False
+        if vehicle not in self.read:
+            try:
+                self.read[vehicle] = read_mapping(vehicle)
+            except DataError:
+                self.read[vehicle] = None
+        mapping = self.read[vehicle]
+        return any(may_be_table(name) for name in files) if mapping is None else mapping.claims(files)
 
 
 def _nearest_vehicle(folder: Path, root: Path) -> Path | None:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import one_line
-from sccal.logs.names import AHRS_FILE
+from sccal.logs.names import AHRS_FILE, ENCODER_FILE
 
 Convention = Literal["enu", "ned"]
 _NO_ARRAYS = ("utc_has_date", "extras", "clock_steps")
@@ -76,6 +76,8 @@ class WheelStream:
     extras: Mapping[str, Floats] = field(default_factory=dict)
     clock_steps: tuple[ClockStep, ...] = ()
     """Steps of its clock whose size only its own rows show (see set_clock)."""
+    source: str = ENCODER_FILE
+    """Where the counts come from, as the user would name it."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,10 @@ import pandas as pd
 from sccal.arrays import Bools, Floats, Ints
 from sccal.errors import DataError
 from sccal.logs.bursts import spread_bursts
-from sccal.logs.column_names import contract_names
+from sccal.logs.column_names import Named, contract_names
 from sccal.logs.compressed import bytes_of
-from sccal.logs.csv_header import COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
-from sccal.logs.dialect import filled_pairs, in_seconds, qualities_of_text, times_of_text, with_points
+from sccal.logs.csv_header import BLANKS, COLUMN_LIMIT, LINE_LIMIT_BYTES, blank_file, is_blank, split_header
+from sccal.logs.dialect import declared_seconds, filled_pairs, in_seconds, qualities_of_text, times_of_text, with_points
 from sccal.logs.set_clock import carried_on
 from sccal.logs.streams import ClockStep, Notice
 from sccal.logs.text import as_utf8
@@ -31,6 +32,10 @@ from sccal.logs.timeline import order_in_time
 
 _LONG_NUMBER = 64
 _TURN_RAD = 6.3
+_TEXT_CELLS = 200
+
+Choice = Callable[[list[str], int], tuple[Named, Sequence[str]]]
+"""What a header's names (and its line) mean, and which columns every row must hold; they hold ``t``."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +71,25 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     Raises:
         DataError: unreadable or empty file, a header without the required columns, or no usable row.
     """
+
+    def chosen(logged: list[str], line: int) -> tuple[Named, Sequence[str]]:
+        named = contract_names(logged, alternatives)
+        return named, _required(named.names, alternatives, path, line)
+
+    return read_chosen(path, chosen)
+
+
+def read_chosen(path: Path, choose: Choice) -> Table:
+    """Read a CSV, the meaning of whose columns is chosen when its header is seen.
+
+    Raises:
+        DataError: as read_table, and whatever the choice raises.
+    """
     source = path.name
-    data = _load(path)
-    logged, separator, header_line, below = split_header(data, path)
-    body = data[below:]
-    named = contract_names(logged, alternatives)
+    header, body = split_table(path)
+    separator, header_line = header.separator, header.line
+    named, required = choose(header.names, header.line)
     names = named.names
-    required = _required(names, alternatives, path, header_line)
     notices: list[Notice] = []
     if named.taken:
         shown = ", ".join(f"{theirs} as {ours}" for ours, theirs in named.taken.items())
@@ -85,7 +102,7 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     frame = _parse(body, names, separator, header_line, path, notices)
     columns, content = _numeric_columns(frame, names, required, header_line, source, notices)
     line = np.arange(len(frame), dtype=np.int64) + header_line + 1
-    columns["t"] = in_seconds(columns["t"], named.time_unit_s, source, notices)
+    columns["t"] = _times_s(frame[names.index("t")], columns["t"], named, source, notices)
     filled_pairs(columns, required, content, source, line, notices)
     if named.plain_yaw:
         _tell_unit_of_yaw(columns, source, notices)
@@ -111,6 +128,92 @@ def read_table(path: Path, alternatives: Sequence[Sequence[str]]) -> Table:
     order, order_notices = order_in_time(columns["t"], line, source)
     columns = {name: column[order] for name, column in columns.items()}
     return Table(source, columns, line[order], rows_seen, (*notices, *order_notices), steps)
+
+
+@dataclass(frozen=True)
+class Header:
+    """The line that names the columns."""
+
+    names: list[str]
+    """``1``, ``2``, … where no line names any."""
+    separator: str
+    line: int
+    """From 1; 0 where there is none."""
+
+
+def split_table(path: Path) -> tuple[Header, bytes]:
+    """The header of a table, and what stands below it; runs of blanks between cells have become one tab each.
+
+    Raises:
+        DataError: unreadable or empty file, or one without a header.
+    """
+    data = _load(path)
+    names, separator, line, below = split_header(data, path)
+    body = data[below:]
+    if all(_is_number(name) for name in names):
+        body = data[data.rfind(b"\n", 0, max(below - 1, 0)) + 1 :]
+        names, line = [str(place + 1) for place in range(len(names))], line - 1
+    if separator == BLANKS:
+        body, separator = _between_tabs(body), "\t"
+    return Header(names, separator, line), body
+
+
+def columns_of(path: Path) -> tuple[Header, dict[str, Floats], dict[str, list[str]]]:
+    """Header, every column of numbers (n, NaN where a cell holds none), and the first cells of columns of text.
+
+    Whole lines that cannot be read are rows without numbers. The times of a column of dates are in seconds.
+
+    Raises:
+        DataError: as split_table.
+    """
+    header, body = split_table(path)
+    lost: list[Notice] = []
+    body = _without_endless_lines(body, header.line, path.name, lost)
+    body = with_points(body, header.separator, path.name, lost)
+    frame = _parse(body, header.names, header.separator, header.line, path, lost)
+    numbers: dict[str, Floats] = {}
+    texts: dict[str, list[str]] = {}
+    for position, name in enumerate(header.names):
+        if not name or name in numbers or name in texts:
+            continue
+        series = frame[position]
+        values = _floats(series)
+        values[~np.isfinite(values)] = np.nan
+        if np.isfinite(values).any():
+            numbers[name] = values
+            continue
+        dates = times_of_text(series, values, path.name, lost) if _is_text(series) else values
+        if np.isfinite(dates).any():
+            numbers[name] = dates
+        texts[name] = [str(cell).strip().strip('"') for cell in series.dropna().iloc[:_TEXT_CELLS]]
+    return header, numbers, texts
+
+
+def _between_tabs(body: bytes) -> bytes:
+    """Rows whose cells stood apart by blanks; a date and its time of day stay one cell."""
+    whole = re.sub(rb"(\d{4}-\d\d-\d\d) +(\d\d:\d\d)", rb"\1T\2", body)
+    return re.sub(rb"[ \t]+", b"\t", re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", whole))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", ".") or "x")
+    except ValueError:
+        return False
+    return True
+
+
+def _times_s(cells: pd.Series[Any], t: Floats, named: Named, source: str, notices: list[Notice]) -> Floats:
+    """A column of times in seconds: of dates, or of numbers in the unit that is declared or that name and size say."""
+    if _is_text(cells):
+        dated = times_of_text(cells, t, source, notices)
+        if dated is not t:
+            return dated
+    return (
+        declared_seconds(t, named.time_unit_s, source)
+        if named.declared
+        else (in_seconds(t, named.time_unit_s, source, notices))
+    )
 
 
 def _load(path: Path) -> bytes:
@@ -252,8 +355,6 @@ def _numeric_columns(
             continue
         values = _floats(series)
         values[~np.isfinite(values)] = np.nan
-        if name == "t" and _is_text(series):
-            values = times_of_text(series, values, source, notices)
         if name == "fix_quality" and _is_text(series):
             values = qualities_of_text(series, values, source, notices)
         if name not in required:

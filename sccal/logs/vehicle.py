@@ -9,6 +9,7 @@ from typing import Any
 
 from sccal.errors import DataError
 from sccal.logs.limits import TICKS_PER_REV, TRACK_M, WHEEL_RADIUS_M
+from sccal.logs.mapping import FileMapping, mapping_in
 from sccal.logs.names import VEHICLE_FILE
 from sccal.logs.streams import Convention, Notice, Vehicle
 
@@ -42,7 +43,7 @@ def read_vehicle(path: Path) -> tuple[Vehicle, tuple[Notice, ...]]:
     Raises:
         DataError: the file cannot be read, is not TOML, lacks a nominal value, or holds a value out of range.
     """
-    document = _load(path)
+    document, text = _load(path)
     tables = {name: _table(document, name, path) for name in _KNOWN_KEYS}
     bits = _number(tables, "encoder", "counter_bits", path)
     if bits is not None and not (8 <= bits <= 64 and bits == int(bits)):
@@ -61,16 +62,28 @@ def read_vehicle(path: Path) -> tuple[Vehicle, tuple[Notice, ...]]:
         counter_bits=None if bits is None else int(bits),
         convention=_convention(tables["ahrs"], path),
     )
+    mapping_in(document, text, path)
     return vehicle, _unknown_keys(document, tables, path)
 
 
-def _load(path: Path) -> dict[str, Any]:
+def read_mapping(path: Path) -> FileMapping:
+    """What ``[files]`` of a vehicle.toml says of the runs' files; empty where it says nothing.
+
+    Raises:
+        DataError: the file cannot be read, or says something that is not understood.
+    """
+    document, text = _load(path)
+    return mapping_in(document, text, path)
+
+
+def _load(path: Path) -> tuple[dict[str, Any], str]:
+    """The document, and the text that it was read from."""
     try:
         size = path.stat().st_size
         if size > _LARGEST_BYTES:
             raise DataError(f"{path}: {size} bytes are no {VEHICLE_FILE}; it should hold {MINIMAL_VEHICLE}")
-        text = path.read_bytes().decode("utf-8-sig")
-        return tomllib.loads(text.replace("\r\n", "\n"))
+        text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+        return tomllib.loads(text), text
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:
@@ -127,7 +140,7 @@ def _convention(ahrs: dict[str, Any], path: Path) -> Convention:
 
 
 def _unknown_keys(document: dict[str, Any], tables: dict[str, dict[str, Any]], path: Path) -> tuple[Notice, ...]:
-    unknown = [key for key in document if key != "name" and key not in _KNOWN_KEYS]
+    unknown = [key for key in document if key not in ("name", "files") and key not in _KNOWN_KEYS]
     unknown += [f"{table}.{key}" for table, known in _KNOWN_KEYS.items() for key in tables[table] if key not in known]
     if not unknown:
         return ()
