@@ -39,6 +39,9 @@ WORSE_NATS, MOST_HALVINGS = 3.0, 5
 """A step after which the data are less likely by more than what linearising elsewhere changes is halved, so often."""
 NARROW = 0.1
 """Of the effects' priors: so narrow they are where a pass with the whole ones would leave the path."""
+ANTENNA_M = 1.0
+"""How far the place may be from the first fixes, for all that a fit knows: with a start that is sure of it, an antenna
+off the middle stays near where it was supposed to be. The same with an antenna and without, so that fits compare."""
 KNOWN_AFTER = 100.0
 STOOD_S = 5.0
 LEAST_PATH = 10
@@ -260,7 +263,10 @@ class RunProblem:
             with_sigmas,
         )
         scale = at.prior_scale if prior_scale is None else prior_scale
-        run.begin(laid.start, at.constants, self.scaled_prior(scale), at.values)
+        start = laid.start
+        if linearise_there or self.extra:
+            start = replace(start, sigma_position_m=float(np.hypot(start.sigma_position_m, ANTENNA_M)))
+        run.begin(start, at.constants, self.scaled_prior(scale), at.values)
         return run
 
     def passed(

@@ -34,9 +34,6 @@ PHASE_CENTRE_M = 0.01
 ODD_SCALE = 0.15
 """Beyond this the wheels' declared scale, not their wear, is wrong."""
 MUCH_UNSURER = 2.0
-ANTENNA_M = 1.0
-"""How far the place is from the first fixes, for all that the start knows: who takes it for sure makes an antenna that
-is off the middle stay near where it was supposed to be."""
 CHORD_S = 2.0
 STRAIGHT_RAD = 0.2
 """Of turning within a chord, which is then shorter than its arc by less than a per cent."""
@@ -128,7 +125,7 @@ def find_start(aligned: Aligned) -> Start:
         north_m=float(position.imag),
         yaw_rad=yaw_first - offset,
         offset_rad=float(np.arctan2(np.sin(offset), np.cos(offset))),
-        sigma_position_m=float(np.hypot(3.0 * fit.rms_m + np.median(sigma) + 0.1 + 0.05 * driven_before, ANTENNA_M)),
+        sigma_position_m=float(3.0 * fit.rms_m + np.median(sigma) + 0.1 + 0.05 * driven_before),
         sigma_yaw_rad=float(
             np.sqrt(HEADING_FLOOR_RAD**2 + (2 * fit.sigma_angle) ** 2 + min(fit.rms_m / fit.spread_m, 1.0) ** 2)
         ),

@@ -58,7 +58,7 @@ def test_the_stated_sigmas_cover_the_errors(simulate, streams, seed):
     start = find_start(aligned)
     true = log.motion.at(np.array([aligned.span_s[0] - log.settings.clock.start_utc_s]))
     assert abs(turned(start.yaw_rad - true.yaw_rad[0])) < 3.0 * np.degrees(start.sigma_yaw_rad)
-    assert 0.0 < start.sigma_position_m < 1.5
+    assert 0.0 < start.sigma_position_m < 1.0
     assert np.degrees(start.sigma_yaw_rad) < 20.0
 
 
