@@ -34,8 +34,9 @@ def antenna_by_path(t_s: Floats, fixes_m: Complexes, path_m: Complexes, yaw_rad:
         return None
     stretch = ((t_s - t_s[0]) / STRETCH_S).astype(np.int64)
     weight = np.ones(t_s.size)
+    logged = path_m, np.exp(1j * yaw_rad), fixes_m
     for _ in range(ROUNDS):
-        path, arm, fixes = (_less_means(one, weight, stretch) for one in (path_m, np.exp(1j * yaw_rad), fixes_m))
+        path, arm, fixes = (_less_means(one, weight, stretch) for one in logged)
         root = np.sqrt(weight)
         solved, *_ = np.linalg.lstsq(np.column_stack((path, arm)) * root[:, None], fixes * root, rcond=None)
         left = np.abs(fixes - solved[0] * path - solved[1] * arm)

@@ -103,7 +103,7 @@ def expect_fix(
         else:
             shift_e += ce
             shift_n += cn
-    # h = p + R(θ̄) a + R'(θ̄) a (θ − θ̄): what turns the antenna from the heading of an earlier pass to this one's.
+    # h = p + R(θ̄) a + R'(θ̄) a (θ − θ̄): the antenna turned as told, and from there to the estimate.
     shift_e -= arm_n * (x[THETA] - at)
     shift_n += arm_e * (x[THETA] - at)
     antenna[f, 0] = x[X] + arm_e + shift_e
